@@ -2,12 +2,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/allan_analysis.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/dynamic.hpp"
@@ -21,13 +21,6 @@ constexpr std::size_t kSeeds = 40;
 constexpr std::size_t kRecord = 36000;  // 10 h at 1 Hz
 constexpr std::size_t kWindow = 3600;
 constexpr std::uint64_t kFirstSeed = 1;
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 400> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
 
 double seven_digits(const std::vector<double>& rate, allan::Statistic statistic, std::size_t m) {
     const auto points = allan::deviations(allan::Series::from_rate(rate, 1.0), statistic,
@@ -61,18 +54,18 @@ void add_handbook(Reproduction& table) {
         n = 16807 * n % kModulus;
     }
     const auto add = [&](const std::string& item, std::string published, const std::string& value) {
-        table.rows.push_back({item, published, value, published == value});
+        table.add(item, published, value, published == value);
     };
     for (const Published& row : kHandbook) {
         for (std::size_t k = 0; k < row.nine.size(); ++k) {
             const std::size_t m = k + 1;
-            add(text("SP 1065, 9 points, %s, m = %zu", allan::name_of(row.statistic), m),
-                row.nine[k], text("%#.7g", seven_digits(nine, row.statistic, m)));
+            add(printed("SP 1065, 9 points, %s, m = %zu", allan::name_of(row.statistic), m),
+                row.nine[k], printed("%#.7g", seven_digits(nine, row.statistic, m)));
         }
         std::size_t m = 1;
         for (const char* published : row.thousand) {
-            add(text("SP 1065, 1000 points, %s, m = %zu", allan::name_of(row.statistic), m),
-                published, text("%.6e", seven_digits(thousand, row.statistic, m)));
+            add(printed("SP 1065, 1000 points, %s, m = %zu", allan::name_of(row.statistic), m),
+                published, printed("%.6e", seven_digits(thousand, row.statistic, m)));
             m *= 10;
         }
     }
@@ -81,10 +74,10 @@ void add_handbook(Reproduction& table) {
 void add_multipliers(Reproduction& table) {
     std::string computed;
     for (const int power : {-2, -1, 0, 1, 2}) {
-        computed += text("%s%g", computed.empty() ? "" : " ", allan::allan_multiplier(power) + 0.0);
+        computed +=
+            printed("%s%g", computed.empty() ? "" : " ", allan::allan_multiplier(power) + 0.0);
     }
-    table.rows.push_back(
-        {"multipliers a4 a3 a0 a1 a2", "1.5 1 0 -2 -6", computed, computed == "1.5 1 0 -2 -6"});
+    table.add("multipliers a4 a3 a0 a1 a2", "1.5 1 0 -2 -6", computed, computed == "1.5 1 0 -2 -6");
 }
 
 allan::DynamicSummary windows(const std::vector<double>& rate, allan::MeanMode mode) {
@@ -166,18 +159,15 @@ void add_gauss_markov(Reproduction& table, std::size_t seeds, Progress& progress
     }
     const double k = kS * std::sqrt(2 / 1.5);
     const auto row = [&](const char* item, const std::string& expected, const Statistics& s) {
-        table.rows.push_back({std::string("slow Gauss-Markov, ") + item,
-                              "-",
-                              text("%.4f +- %.4f", s.mean(), s.deviation()),
-                              {},
-                              {{"mean", s.mean()}, {"deviation", s.deviation()}},
-                              expected});
+        table.add(std::string("slow Gauss-Markov, ") + item, "-",
+                  printed("%.4f +- %.4f", s.mean(), s.deviation()), {}, expected,
+                  {{"mean", s.mean()}, {"deviation", s.deviation()}});
     };
-    row("sqrt(a0), window mean", text("0.0084 (true %.4f)", kS), root_a0);
-    row("K, window mean", text("0.029 (true %.4f)", k), paper_k);
+    row("sqrt(a0), window mean", printed("0.0084 (true %.4f)", kS), root_a0);
+    row("K, window mean", printed("0.029 (true %.4f)", k), paper_k);
     row("R, window mean (none is there)", "false R", paper_r);
-    row("K, corrected", text("0.0200 +- 0.0023 (true %.4f)", k), corrected_k);
-    row("K, Allan fit", text("0.0221 +- 0.0021 (true %.4f)", k), direct_k);
+    row("K, corrected", printed("0.0200 +- 0.0023 (true %.4f)", k), corrected_k);
+    row("K, Allan fit", printed("0.0221 +- 0.0021 (true %.4f)", k), direct_k);
 }
 
 void add_synthetic(Reproduction& table, std::size_t seeds, Progress& progress) {
@@ -203,21 +193,13 @@ void add_synthetic(Reproduction& table, std::size_t seeds, Progress& progress) {
     }
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         const double rms = direct[j].rms_error(kTruth[j]);
-        table.rows.push_back({text("rms error of %s, direct fit", allan::kTermNames[j]),
-                              "-",
-                              text("%.2g %%", rms),
-                              rms <= kLimit[j],
-                              {{"rms_percent", rms}},
-                              kDirect[j]});
+        table.add(printed("rms error of %s, direct fit", allan::kTermNames[j]), "-",
+                  printed("%.2g %%", rms), rms <= kLimit[j], kDirect[j], {{"rms_percent", rms}});
     }
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
-        table.rows.push_back(
-            {text("rms error of %s, window mean (paper's way)", allan::kTermNames[j]),
-             "-",
-             text("%.3g %%", paper[j].rms_error(kTruth[j])),
-             {},
-             {{"rms_percent", paper[j].rms_error(kTruth[j])}},
-             kPaper[j]});
+        table.add(printed("rms error of %s, window mean (paper's way)", allan::kTermNames[j]), "-",
+                  printed("%.3g %%", paper[j].rms_error(kTruth[j])), {}, kPaper[j],
+                  {{"rms_percent", paper[j].rms_error(kTruth[j])}});
     }
 }
 
@@ -258,16 +240,14 @@ void add_charts(Reproduction& table) {
 
 Reproduction reproduce_allan(const ReproduceOptions& options) {
     const std::size_t seeds = options.seeds > 0 ? options.seeds : kSeeds;
-    Reproduction table;
-    table.name = "allan";
-    table.title = "Allan statistics, classical and dynamic Allan variance";
+    Reproduction table{"allan", "Allan statistics, classical and dynamic Allan variance"};
     Progress progress("reproducing allan");
     add_handbook(table);
     add_multipliers(table);
     add_gauss_markov(table, seeds, progress);
     add_synthetic(table, seeds, progress);
     if (!options.plot.empty()) add_charts(table);
-    table.notes.push_back(text(
+    table.notes.push_back(printed(
         "Monte-Carlo rows: %zu runs, seeds from %d; 10 h at 1 Hz, windows of 3600 s; Q 0.1 arcsec, "
         "N 0.001 deg/rt-h, and s = 0.02 deg/h, tm = 1.5 h or B 0.01, K 0.02, R 0.02",
         seeds, static_cast<int>(kFirstSeed)));

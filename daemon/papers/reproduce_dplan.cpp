@@ -2,9 +2,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 #include "daemon/papers/reproduce.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/plan_study.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
@@ -18,18 +18,11 @@ using planning::Effort;
 using planning::Problem;
 using planning::Vec3;
 
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 300> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
-
 /// What the paper states without a number of its own, our derivation's number, and ours computed;
 /// compares as printed.
 void add(Reproduction& table, const std::string& item, const std::string& published,
          const std::string& theory, const std::string& computed) {
-    table.rows.push_back({item, published, computed, theory == computed, {}, theory});
+    table.add(item, published, computed, theory == computed, theory);
 }
 
 constexpr std::size_t kFaces = 6, kEdges = 12, kAll = 26;
@@ -100,13 +93,13 @@ void add_ranks(Reproduction& table) {
             const bool in = i < kFaces ? set.faces : i < kFaces + kEdges ? set.edges : set.corners;
             effort.push_back(in ? 1 : 0);
         }
-        add(table, text("one sphere, %s: rank of 10", set.name), "not full", set.rank,
-            text("%zu", planning::evaluate(one, effort).rank));
+        add(table, printed("one sphere, %s: rank of 10", set.name), "not full", set.rank,
+            printed("%zu", planning::evaluate(one, effort).rank));
     }
     add(table, "two spheres, r = 1.1: rank", "full", "10",
-        text("%zu", planning::evaluate(two_spheres(1.1), Effort(2 * kAll, 1)).rank));
+        printed("%zu", planning::evaluate(two_spheres(1.1), Effort(2 * kAll, 1)).rank));
     add(table, "two spheres, r = 1: rank", "-", "9",
-        text("%zu", planning::evaluate(two_spheres(1), Effort(2 * kAll, 1)).rank));
+        printed("%zu", planning::evaluate(two_spheres(1), Effort(2 * kAll, 1)).rank));
 }
 
 /// [6] with 4a runs per point and [8] with 12 - 3a: the a with the largest determinant.
@@ -126,11 +119,11 @@ void add_allocation(Reproduction& table) {
                     largest = a;
                 }
             }
-            best += text("%s%d", best.empty() ? "" : " ", largest);
+            best += printed("%s%d", best.empty() ? "" : " ", largest);
         }
         const bool six_inside = kAllocations[k] == Allocation::split_68;
-        add(table, text("largest det at a =, r = 1.1 1.5 2 3 10, %s", kAllocationNames[k]), "a = 2",
-            six_inside ? "2 1 1 1 1" : "2 2 2 2 2", best);
+        add(table, printed("largest det at a =, r = 1.1 1.5 2 3 10, %s", kAllocationNames[k]),
+            "a = 2", six_inside ? "2 1 1 1 1" : "2 2 2 2 2", best);
     }
 }
 
@@ -142,8 +135,8 @@ void add_growth(Reproduction& table) {
         const double growth = (planning::evaluate(two_spheres(2000), effort).log_det -
                                planning::evaluate(two_spheres(1000), effort).log_det) /
                               std::log(2.0);
-        add(table, text("det M grows with r to the power, %s", kAllocationNames[k]), "grows",
-            kDerived[k], text("%.0f", growth));
+        add(table, printed("det M grows with r to the power, %s", kAllocationNames[k]), "grows",
+            kDerived[k], printed("%.0f", growth));
     }
 }
 
@@ -162,24 +155,21 @@ void add_double_sphere_efficiencies(Reproduction& table) {
         const planning::Optimum best = planning::d_optimum(problem);
         double outer = 0;
         for (std::size_t i = kAll; i < 2 * kAll; ++i) outer += best.share[i];
-        add(table, text("r = %g: optimal mass on the outer sphere", row.r), "-", row.outer,
-            text("%.4f", outer));
+        add(table, printed("r = %g: optimal mass on the outer sphere", row.r), "-", row.outer,
+            printed("%.4f", outer));
         std::string bounds;
         for (std::size_t k = 0; k < kAllocations.size(); ++k) {
             const Effort effort = allocated(kAllocations[k], 8, 6);
             const auto e = planning::evaluate(problem, effort);
-            add(table, text("r = %g: D-efficiency of [6]8 + [8]6, %s", row.r, kAllocationNames[k]),
+            add(table,
+                printed("r = %g: D-efficiency of [6]8 + [8]6, %s", row.r, kAllocationNames[k]),
                 "D-optimal", row.efficiency[k],
-                text("%.3f", planning::d_efficiency(e, best.log_det)));
+                printed("%.3f", planning::d_efficiency(e, best.log_det)));
             bounds +=
-                text("%s%.2f", k == 0 ? "" : " ", planning::equivalence_bound(problem, effort));
+                printed("%s%.2f", k == 0 ? "" : " ", planning::equivalence_bound(problem, effort));
         }
-        table.rows.push_back({text("r = %g: equivalence bounds p / max d, in that order", row.r),
-                              "-",
-                              bounds,
-                              {},
-                              {},
-                              row.r == 2 ? "0.10 to 0.55" : "-"});
+        table.add(printed("r = %g: equivalence bounds p / max d, in that order", row.r), "-",
+                  bounds, {}, row.r == 2 ? "0.10 to 0.55" : "-");
     }
 }
 
@@ -221,7 +211,7 @@ double best_mass(const Problem& two) {
 }
 
 std::string number(bool three_decimals, const char* before, double value) {
-    return three_decimals ? text("%s%.3f", before, value) : text("%s%.2f", before, value);
+    return three_decimals ? printed("%s%.3f", before, value) : printed("%s%.2f", before, value);
 }
 
 void add_rig_optimum(Reproduction& table) {
@@ -232,14 +222,12 @@ void add_rig_optimum(Reproduction& table) {
         rest += best.share[i];
         six += best.share[4 * kAll + i];
     }
-    add(table, "optimum over 0, 2, 4, 4.667, 6 g: mass at rest", "-", "0.1432", text("%.4f", rest));
-    add(table, "optimum over 0, 2, 4, 4.667, 6 g: mass at 6 g", "-", "0.8568", text("%.4f", six));
-    table.rows.push_back({"general equivalence theorem: max d - 10",
-                          "-",
-                          text("%.0e", best.gap),
-                          best.gap < 1e-6,
-                          {},
-                          "below 1e-6"});
+    add(table, "optimum over 0, 2, 4, 4.667, 6 g: mass at rest", "-", "0.1432",
+        printed("%.4f", rest));
+    add(table, "optimum over 0, 2, 4, 4.667, 6 g: mass at 6 g", "-", "0.8568",
+        printed("%.4f", six));
+    table.add("general equivalence theorem: max d - 10", "-", printed("%.0e", best.gap),
+              best.gap < 1e-6, "below 1e-6");
 
     struct Row {
         double high, low, mass;         ///< on the larger level; 0: the best
@@ -256,9 +244,10 @@ void add_rig_optimum(Reproduction& table) {
         const auto e = planning::evaluate(two, rotatable(1 - mass, mass));
         const std::array<double, 5> computed{planning::d_efficiency(e, best.log_det), e.sigma[0],
                                              e.sigma[1], e.sigma[4], e.sigma[7]};
-        ReproducedRow line{text("%.4g and %.4g g, %.3f on the larger: D-eff., std D0, Di, Dii, Dij",
-                                row.high, row.low, mass),
-                           "-", "", true};
+        ReproducedRow line{
+            printed("%.4g and %.4g g, %.3f on the larger: D-eff., std D0, Di, Dii, Dij", row.high,
+                    row.low, mass),
+            "-", "", true};
         for (std::size_t k = 0; k < computed.size(); ++k) {
             // Numbers above 1 have two decimals in the derived table, but for the efficiencies.
             const bool three = k == 0 || row.derived[k] < 1;
@@ -287,18 +276,16 @@ void add_rig_optimum(Reproduction& table) {
         std::size_t at_rest = 0;
         for (std::size_t i = 0; i < kAll; ++i) at_rest += counts[i];
         // Not worse than derived, to the digits given.
-        table.rows.push_back({text("exact plan of %zu runs: D-efficiency (at rest)", exact.runs),
-                              "-",
-                              text("%.4f (%zu)", efficiency, at_rest),
-                              std::round(1e3 * efficiency) >= 1e3 * exact.derived - 1e-6,
-                              {},
-                              text("%.3f", exact.derived)});
+        table.add(printed("exact plan of %zu runs: D-efficiency (at rest)", exact.runs), "-",
+                  printed("%.4f (%zu)", efficiency, at_rest),
+                  std::round(1e3 * efficiency) >= 1e3 * exact.derived - 1e-6,
+                  printed("%.3f", exact.derived));
     }
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-    table.notes.push_back(
-        text("the six exact plans are the best of random starts, 20 at least, seed %d; they took "
-             "%.2f s. Nothing else here is drawn",
-             static_cast<int>(planning::ExactSearch{}.seed), took.count()));
+    table.notes.push_back(printed(
+        "the six exact plans are the best of random starts, 20 at least, seed %d; they took "
+        "%.2f s. Nothing else here is drawn",
+        static_cast<int>(planning::ExactSearch{}.seed), took.count()));
 }
 
 void add_position_table(Reproduction& table) {
@@ -312,26 +299,23 @@ void add_position_table(Reproduction& table) {
     const auto strong = planner::vertical_axes({}, positions, {4.667, 6});
     const auto weak = planner::vertical_axes({}, positions, {0, 6});
     for (std::size_t k = 0; k < kDerived.size(); ++k) {
-        add(table, text("14 positions, %c vertical: D-eff. at 6 + 4.667 and 6 + 0 g", "xyz"[k]),
+        add(table, printed("14 positions, %c vertical: D-eff. at 6 + 4.667 and 6 + 0 g", "xyz"[k]),
             "-", kDerived[k],
-            text("%zu directions, rank %zu / %zu, %.3f, %.3f", strong[k].directions,
-                 strong[k].rank_one_level, strong[k].rank, strong[k].d_efficiency,
-                 weak[k].d_efficiency));
+            printed("%zu directions, rank %zu / %zu, %.3f, %.3f", strong[k].directions,
+                    strong[k].rank_one_level, strong[k].rank, strong[k].d_efficiency,
+                    weak[k].d_efficiency));
     }
 }
 
 /// The determinant of [6]8 + [8]6 over r, in decades, for each allocation.
 plot::Chart growth_chart() {
-    plot::Chart chart;
-    chart.title = "Determinant of [6]8 + [8]6 over the ratio of the spheres";
-    chart.x = plot::Axis("r", true);
-    chart.y = plot::Axis("det M", true);
+    plot::Chart chart{"Determinant of [6]8 + [8]6 over the ratio of the spheres",
+                      plot::Axis("r", true), plot::Axis("det M", true)};
     for (std::size_t k = 0; k < kAllocations.size(); ++k) {
-        plot::Curve curve{kAllocationNames[k], {}, {}, {}, {}, plot::Look::line};
+        plot::Curve curve{kAllocationNames[k]};
         for (double r = 1.05; r < 10.01; r *= 1.05) {
             const auto e = planning::evaluate(two_spheres(r), allocated(kAllocations[k], 8, 6));
-            curve.x.push_back(r);
-            curve.y.push_back(std::exp(e.log_det + 10 * std::log(e.effort)));
+            curve.add(r, std::exp(e.log_det + 10 * std::log(e.effort)));
         }
         chart.curves.push_back(curve);
     }
@@ -340,18 +324,16 @@ plot::Chart growth_chart() {
 
 /// The determinant over a at r = 2, each over its largest.
 plot::Chart allocation_chart() {
-    plot::Chart chart;
-    chart.title = "Determinant over the allocation a at r = 2";
-    chart.x = plot::Axis("a: [6] with 4a, [8] with 12 - 3a runs per point");
-    chart.y = plot::Axis("det M over its largest");
+    plot::Chart chart{"Determinant over the allocation a at r = 2",
+                      plot::Axis("a: [6] with 4a, [8] with 12 - 3a runs per point"),
+                      plot::Axis("det M over its largest")};
     for (std::size_t k = 0; k < kAllocations.size(); ++k) {
-        plot::Curve curve{kAllocationNames[k], {}, {}, {}, {}, plot::Look::line};
+        plot::Curve curve{kAllocationNames[k]};
         double largest = 0;
         for (double a = 0.1; a < 3.95; a += 0.1) {
             const auto e =
                 planning::evaluate(two_spheres(2), allocated(kAllocations[k], 4 * a, 12 - 3 * a));
-            curve.x.push_back(a);
-            curve.y.push_back(std::exp(e.log_det + 10 * std::log(e.effort)));
+            curve.add(a, std::exp(e.log_det + 10 * std::log(e.effort)));
             largest = std::max(largest, curve.y.back());
         }
         for (double& y : curve.y) y /= largest;
@@ -362,9 +344,7 @@ plot::Chart allocation_chart() {
 }
 
 Reproduction all(bool charts) {
-    Reproduction table;
-    table.name = "dplan";
-    table.title = "D-optimal test plans";
+    Reproduction table{"dplan", "D-optimal test plans"};
     add_ranks(table);
     add_allocation(table);
     add_growth(table);

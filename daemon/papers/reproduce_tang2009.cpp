@@ -7,7 +7,7 @@
 #include "daemon/papers/reproduce_tang2009_plot.hpp"
 #include "daemon/papers/reproduce_tang2009_study.hpp"
 #include "daemon/papers/reproduce_tang2009_theory.hpp"
-#include "daemon/papers/reproduce_text.hpp"
+#include "daemon/results/text_line.hpp"
 #include "estimator/allan/edf.hpp"
 #include "estimator/filter/parameters.hpp"
 
@@ -68,9 +68,13 @@ double rms(const Study& study, tang2009::Route route, const Group& group) {
     return 100 * std::sqrt(sum / static_cast<double>(study.seeds.size()));
 }
 
-/// A number from some seeds and the standard deviation that chance gives it.
+/// A number, and if it is from some seeds the standard deviation that chance gives it.
 struct Drawn {
-    double value = 0, chance = 0;
+    double value = 0;
+    std::optional<double> chance = {};
+    [[nodiscard]] std::string text() const {
+        return chance ? printed("%.4g +- %.2g", value, *chance) : printed("%.4g", value);
+    }
 };
 
 Drawn drawn_rms(const Study& study, tang2009::Route route, const Group& group) {
@@ -101,28 +105,29 @@ Drawn drawn_ratio(const Study& study, tang2009::Route above, tang2009::Route bel
     return {value, value * std::sqrt(variance) / 2};
 }
 
-std::string levels(const Study& study) { return formatted("%.4g g", study.platform_g(9)); }
+std::string levels(const Study& study) { return printed("%.4g g", study.platform_g(9)); }
 /// The same as the end of a key.
-std::string at_level(const Study& study) { return formatted("_%.4gg", study.platform_g(9)); }
+std::string at_level(const Study& study) { return printed("_%.4gg", study.platform_g(9)); }
 
-void add_coefficients(const std::vector<Study>& studies, std::vector<ReproducedRow>& rows) {
+void add_coefficients(const std::vector<Study>& studies, Reproduction& table) {
     using enum tang2009::Route;
     const std::array<std::array<tang2009::Route, 2>, 3> routes{
         {{kTwoStep1, kJoint1}, {kTwoStep2, kJoint2}, {kOneLevel3, kOneLevel3}}};
     for (std::size_t trial = 0; trial < 3; ++trial) {
         for (std::size_t i = 0; i < kParameters; ++i) {
             const char* text = i % 10 >= 4 ? "%s %.5f +- %.5f" : "%s %.4f +- %.4f";
-            ReproducedRow row{formatted("Table 2, trial %zu, %s (truth %g)", trial + 1,
-                                        estimator::parameter_names()[i], truth()[i]),
-                              formatted("%.4f", kTable2[trial][i]),
+            ReproducedRow row{printed("Table 2, trial %zu, %s (truth %g)", trial + 1,
+                                      estimator::parameter_names()[i], truth()[i]),
+                              printed("%.4f", kTable2[trial][i]),
                               "",
                               {},
+                              "",
                               {{"published", kTable2[trial][i]}, {"truth", truth()[i]}}};
             for (const Study& study : studies) {
                 const auto& seed = study.seeds.front();
                 row.computed += (row.computed.empty() ? "" : "; ") + levels(study) + ": ";
                 const auto add = [&](const char* name, const char* key, const Outcome& outcome) {
-                    row.computed += formatted(text, name, outcome.value[i], outcome.sigma[i]);
+                    row.computed += printed(text, name, outcome.value[i], outcome.sigma[i]);
                     row.values.emplace_back(key + at_level(study), outcome.value[i]);
                     row.values.emplace_back(key + ("_sigma" + at_level(study)), outcome.sigma[i]);
                 };
@@ -134,12 +139,12 @@ void add_coefficients(const std::vector<Study>& studies, std::vector<ReproducedR
                     add("one level", "one_level", seed[routes[trial][0]]);
                 }
             }
-            rows.push_back(std::move(row));
+            table.rows.push_back(std::move(row));
         }
     }
 }
 
-void add_errors(const std::vector<Study>& studies, std::vector<ReproducedRow>& rows) {
+void add_errors(const std::vector<Study>& studies, Reproduction& table) {
     using enum tang2009::Route;
     struct Line {
         const char* name;
@@ -159,77 +164,48 @@ void add_errors(const std::vector<Study>& studies, std::vector<ReproducedRow>& r
                     line.trial < 0 ? 0.0
                                    : rms(kTable2[static_cast<std::size_t>(line.trial)], group);
                 const double computed = rms(study, line.route, group);
-                rows.push_back({"rms relative error, %, " + levels(study) + ", " + line.name +
-                                    ", " + group.name,
-                                line.trial < 0 ? "-" : formatted("%.2f", published),
-                                formatted("%.3f", computed),
-                                {},
-                                {{"computed", computed}}});
-                if (line.trial >= 0) rows.back().values.emplace_back("published", published);
+                table.add("rms relative error, %, " + levels(study) + ", " + line.name + ", " +
+                              group.name,
+                          line.trial < 0 ? "-" : printed("%.2f", published),
+                          printed("%.3f", computed), {}, {}, {{"computed", computed}});
+                if (line.trial >= 0) table.rows.back().values.emplace_back("published", published);
             }
         }
     }
 }
 
-/// A demand on one number; which side is the good one is told by the sign.
-void demand_at_most(std::vector<ReproducedRow>& rows, const std::string& item, double value,
-                    double limit) {
-    rows.push_back({item,
-                    "-",
-                    formatted("%.4g", value),
-                    value <= limit,
-                    {{"computed", value}, {"at_most", limit}},
-                    formatted("at most %.4g", limit)});
-}
-void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, double value,
-                     double limit) {
-    rows.push_back({item,
-                    "-",
-                    formatted("%.4g", value),
-                    value >= limit,
-                    {{"computed", value}, {"at_least", limit}},
-                    formatted("at least %.4g", limit)});
-}
+enum class Side : unsigned char { at_most, at_least };
 
-/// The same for what was drawn, over the seeds that were run; chance is shown and excuses nothing.
-void demand_at_most(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
-                    double limit) {
-    rows.push_back({item,
-                    "-",
-                    formatted("%.4g +- %.2g", drawn.value, drawn.chance),
-                    drawn.value <= limit,
-                    {{"computed", drawn.value}, {"sigma", drawn.chance}, {"at_most", limit}},
-                    formatted("at most %.4g", limit)});
-}
-void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
-                     double limit) {
-    rows.push_back({item,
-                    "-",
-                    formatted("%.4g +- %.2g", drawn.value, drawn.chance),
-                    drawn.value >= limit,
-                    {{"computed", drawn.value}, {"sigma", drawn.chance}, {"at_least", limit}},
-                    formatted("at least %.4g", limit)});
+/// A demand on one number, or on what was drawn over the seeds that were run; chance is shown and
+/// excuses nothing.
+void demand(Reproduction& table, const std::string& item, const Drawn& of, Side side,
+            double limit) {
+    const bool most = side == Side::at_most;
+    std::vector<std::pair<std::string, double>> values{{"computed", of.value}};
+    if (of.chance) values.emplace_back("sigma", *of.chance);
+    values.emplace_back(most ? "at_most" : "at_least", limit);
+    table.add(item, "-", of.text(), most ? of.value <= limit : of.value >= limit,
+              printed("at %s %.4g", most ? "most" : "least", limit), std::move(values));
 }
 
 /// What theory foretells of the joint filter: the mean square of its errors is the bound's. What
 /// was drawn may lie 3.29 standard deviations on either side (99.9 %).
-void demand_theory(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
+void demand_theory(Reproduction& table, const std::string& item, const Drawn& drawn,
                    double theory) {
-    const double band = 3.29 * drawn.chance;
-    rows.push_back({item + ", rms relative error, %, against theory",
-                    "-",
-                    formatted("%.4g +- %.2g", drawn.value, drawn.chance),
-                    std::abs(drawn.value - theory) <= band,
-                    {{"computed", drawn.value},
-                     {"sigma", drawn.chance},
-                     {"theory", theory},
-                     {"at_least", theory - band},
-                     {"at_most", theory + band}},
-                    formatted("%.4g, within %.2g (99.9 %%)", theory, band)});
+    const double band = 3.29 * *drawn.chance;
+    table.add(item + ", rms relative error, %, against theory", "-",
+              printed("%.4g +- %.2g", drawn.value, *drawn.chance),
+              std::abs(drawn.value - theory) <= band,
+              printed("%.4g, within %.2g (99.9 %%)", theory, band),
+              {{"computed", drawn.value},
+               {"sigma", *drawn.chance},
+               {"theory", theory},
+               {"at_least", theory - band},
+               {"at_most", theory + band}});
 }
 
 /// The paper's table is one draw, and may be as far from the mean of ours as one of them (99.7 %).
-void demand_published(std::vector<ReproducedRow>& rows, const Study& study, tang2009::Route route,
+void demand_published(Reproduction& table, const Study& study, tang2009::Route route,
                       std::size_t trial, const Group& group) {
     const auto n = static_cast<double>(study.seeds.size());
     double mean = 0, square = 0;
@@ -241,35 +217,34 @@ void demand_published(std::vector<ReproducedRow>& rows, const Study& study, tang
     const double spread = std::sqrt(std::max(0.0, square - mean * mean) * n / std::max(1.0, n - 1));
     const double published = rms(kTable2[trial], group);
     const double band = 3 * spread * std::sqrt(1 + 1 / n);
-    rows.push_back({levels(study) + formatted(": trial %zu, two-step, %s, rms relative error, %%, "
-                                              "against the paper's one draw",
-                                              trial + 1, group.name),
-                    formatted("%.4g", published),
-                    formatted("%.4g, one seed +- %.2g", mean, spread),
-                    std::abs(published - mean) <= band,
-                    {{"published", published}, {"computed", mean}, {"sigma", spread}},
-                    formatted("within %.2g (99.7 %%)", band)});
+    table.add(levels(study) + printed(": trial %zu, two-step, %s, rms relative error, %%, "
+                                      "against the paper's one draw",
+                                      trial + 1, group.name),
+              printed("%.4g", published), printed("%.4g, one seed +- %.2g", mean, spread),
+              std::abs(published - mean) <= band, printed("within %.2g (99.7 %%)", band),
+              {{"published", published}, {"computed", mean}, {"sigma", spread}});
 }
 
-void add_two_sided(const Study& stated, const Study& doubled, std::vector<ReproducedRow>& rows) {
+void add_two_sided(const Study& stated, const Study& doubled, Reproduction& table) {
     using enum tang2009::Route;
     for (const Study* study : {&stated, &doubled}) {
         for (const auto& [what, route, bound] :
              {std::tuple{": trial 1, joint, ", kJoint1, &study->bound},
               std::tuple{": trial 2, joint, ", kJoint2, &study->bound_trial_2}}) {
             for (const Group& group : {kAll, kBias, kLinear, kSquares, kProducts}) {
-                demand_theory(rows, levels(*study) + what + group.name,
+                demand_theory(table, levels(*study) + what + group.name,
                               drawn_rms(*study, route, group), 100 * relative_rms(*bound, group));
             }
         }
     }
     // The numbers of the table themselves imply the doubled levels.
     for (const Group& group : {kAll, kBias, kLinear, kSquares, kProducts})
-        demand_published(rows, doubled, kTwoStep1, 0, group);
+        demand_published(table, doubled, kTwoStep1, 0, group);
 }
 
-void add_findings(const Study& study, std::vector<ReproducedRow>& rows) {
+void add_findings(const Study& study, Reproduction& table) {
     using enum tang2009::Route;
+    using enum Side;
     const std::string at = levels(study) + ": ";
     // At 6 g the bounds themselves are a little less than an order apart.
     const double bounds =
@@ -278,53 +253,48 @@ void add_findings(const Study& study, std::vector<ReproducedRow>& rows) {
     const double two_step =
         rms(study, kTwoStep2, kSecondOrder) / rms(study, kTwoStep1, kSecondOrder);
     const Drawn joint = drawn_ratio(study, kJoint2, kJoint1, kSecondOrder);
-    const double least = std::min(10.0, bounds - 2 * joint.chance);
-    rows.push_back({at + "error of second-order terms, trial 2 over trial 1",
-                    formatted("%.1f", published),
-                    formatted("joint %.2f +- %.2f, two-step %.2f, bounds %.2f", joint.value,
-                              joint.chance, two_step, bounds),
-                    joint.value >= least,
-                    {{"published", published},
-                     {"bounds", bounds},
-                     {"joint", joint.value},
-                     {"sigma", joint.chance},
-                     {"two_step", two_step},
-                     {"at_least", least}},
-                    formatted("joint at least %.2f (2 sigma)", least)});
+    const double least = std::min(10.0, bounds - 2 * *joint.chance);
+    table.add(at + "error of second-order terms, trial 2 over trial 1", printed("%.1f", published),
+              printed("joint %.2f +- %.2f, two-step %.2f, bounds %.2f", joint.value, *joint.chance,
+                      two_step, bounds),
+              joint.value >= least, printed("joint at least %.2f (2 sigma)", least),
+              {{"published", published},
+               {"bounds", bounds},
+               {"joint", joint.value},
+               {"sigma", *joint.chance},
+               {"two_step", two_step},
+               {"at_least", least}});
     double separable = 0;
     for (const auto& seed : study.seeds) separable += std::isfinite(seed[kJointLevel].nees) ? 1 : 0;
-    demand_at_most(rows, at + "one level with the joint filter, seeds in which it passed for two",
-                   separable, 0);
-    demand_at_least(rows, at + "trial 3, error of bias over that of the joint filter with 9/7 g",
-                    rms(study, kOneLevel3, kBias) / rms(study, kJoint1, kBias), 10);
-    demand_at_least(rows, at + "trial 3, error of squares over that of the joint filter with 9/7 g",
-                    rms(study, kOneLevel3, kSquares) / rms(study, kJoint1, kSquares), 10);
+    demand(table, at + "one level with the joint filter, seeds in which it passed for two",
+           {separable}, at_most, 0);
+    demand(table, at + "trial 3, error of bias over that of the joint filter with 9/7 g",
+           {rms(study, kOneLevel3, kBias) / rms(study, kJoint1, kBias)}, at_least, 10);
+    demand(table, at + "trial 3, error of squares over that of the joint filter with 9/7 g",
+           {rms(study, kOneLevel3, kSquares) / rms(study, kJoint1, kSquares)}, at_least, 10);
     // Table 2 prints the same linear terms and products for trials 1 and 3: both come from the run
     // with 9 g.
     for (const Group& group : {kLinear, kProducts}) {
-        double square = 0, sigma = 0, printed = 0;
+        double square = 0, sigma = 0, in_print = 0;
         for (const auto& seed : study.seeds) {
             for (std::size_t i = 0; i < kParameters; ++i) {
                 if (i % 10 < group.first || i % 10 > group.last) continue;
                 square += std::pow(seed[kOneLevel3].value[i] - seed[kTwoStep1].value[i], 2);
                 sigma += std::pow(seed[kTwoStep1].sigma[i], 2);
-                printed = std::max(printed, std::abs(kTable2[2][i] - kTable2[0][i]));
+                in_print = std::max(in_print, std::abs(kTable2[2][i] - kTable2[0][i]));
             }
         }
         const double ratio = std::sqrt(square / sigma);
-        rows.push_back({at + "trial 3, " + group.name + " less those of trial 1, rms over sigma",
-                        formatted("%.4f", printed),
-                        formatted("%.4f", ratio),
-                        {},
-                        {{"published", printed}, {"computed", ratio}},
-                        "0 at one kappa"});
+        table.add(at + "trial 3, " + group.name + " less those of trial 1, rms over sigma",
+                  printed("%.4f", in_print), printed("%.4f", ratio), {}, "0 at one kappa",
+                  {{"published", in_print}, {"computed", ratio}});
     }
 }
 
 /// What Table 2 prints for trial 3 less what it prints for trial 1, one gyro. A kappa that is one
 /// for the whole run leaves (-kappa, 1, 1, 1) of bias and squares free, and nothing else: D_II -
 /// D_OO and D_SS - D_OO would stay as they are, as the linear terms and products do in print.
-void add_printed_trial_3(std::vector<ReproducedRow>& rows) {
+void add_printed_trial_3(Reproduction& table) {
     constexpr double kRounding = 2e-4;  // four numbers, half a unit of the last place each
     constexpr std::size_t kSquaresAt[] = {4, 5, 6};
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
@@ -336,18 +306,16 @@ void add_printed_trial_3(std::vector<ReproducedRow>& rows) {
         const double moved =
             std::max(std::abs(change(4) - change(5)), std::abs(change(6) - change(5)));
         const double ratio = change(0) / squares;
-        rows.push_back({formatted("Table 2, gyro %c: trial 3 less trial 1, bias over the mean of "
-                                  "the squares; D_II - D_OO or D_SS - D_OO",
-                                  "xyz"[gyro]),
-                        formatted("%.0f; %.4f", ratio, moved),
-                        "-",
-                        {},
-                        {{"published", ratio}, {"published_moved", moved}, {"theory", -73}},
-                        formatted("-73 at 12 g; 0 within %.4f at one kappa", kRounding)});
+        table.add(printed("Table 2, gyro %c: trial 3 less trial 1, bias over the mean of "
+                          "the squares; D_II - D_OO or D_SS - D_OO",
+                          "xyz"[gyro]),
+                  printed("%.0f; %.4f", ratio, moved), "-", {},
+                  printed("-73 at 12 g; 0 within %.4f at one kappa", kRounding),
+                  {{"published", ratio}, {"published_moved", moved}, {"theory", -73}});
     }
 }
 
-void add_statistics(const Study& study, std::vector<ReproducedRow>& rows) {
+void add_statistics(const Study& study, Reproduction& table) {
     using tang2009::kJoint1;
     const auto n = static_cast<double>(study.seeds.size());
     double nees = 0, nis = 0, ratio = 0, off = 0;
@@ -364,56 +332,53 @@ void add_statistics(const Study& study, std::vector<ReproducedRow>& rows) {
     const std::string at = levels(study) + ", joint, trial 1: ";
     const auto within = [&](const char* what, double value, double centre, double band,
                             const char* format) {
-        rows.push_back(
-            {at + what,
-             "-",
-             formatted(format, value),
-             std::abs(value - centre) <= band,
-             {{"computed", value}, {"at_least", centre - band}, {"at_most", centre + band}},
-             formatted(format, centre - band) + " to " + formatted(format, centre + band) +
-                 " (95 %)"});
+        table.add(
+            at + what, "-", printed(format, value), std::abs(value - centre) <= band,
+            printed(format, centre - band) + " to " + printed(format, centre + band) + " (95 %)",
+            {{"computed", value}, {"at_least", centre - band}, {"at_most", centre + band}});
     };
     // 112 000 samples of three axes in each seed.
     within("mean NEES of 30", nees, 30, 1.96 * std::sqrt(60 / n), "%.2f");
     within("mean NIS per degree of freedom", nis, 1, 1.96 * std::sqrt(2 / (336e3 * n)), "%.5f");
-    demand_at_most(rows, at + "largest difference of sigma from the Cramer-Rao bound", off, 0.01);
+    demand(table, at + "largest difference of sigma from the Cramer-Rao bound", {off},
+           Side::at_most, 0.01);
     // Few seeds may exceed 1.05 by chance. The mean square has as many degrees of freedom as a
     // chi-square of its variance: 30 per seed, fewer since the coefficients of a seed correlate.
     const double degrees =
         n * std::pow(kParameters, 2) / study.seeds.front()[kJoint1].correlation_square;
     const double chance = std::sqrt(estimator::allan::chi_square_quantile(0.95, degrees) / degrees);
     const double limit = std::max(1.05, chance);
-    demand_at_most(
-        rows,
-        at + "rms of error over Cramer-Rao bound (1.05, or the 95 % chi-square limit of " +
-            formatted("%zu seeds)", study.seeds.size()),
-        std::sqrt(ratio), limit);
+    demand(table,
+           at + "rms of error over Cramer-Rao bound (1.05, or the 95 % chi-square limit of " +
+               printed("%zu seeds)", study.seeds.size()),
+           {std::sqrt(ratio)}, Side::at_most, limit);
 }
 
-void add_acceptance(const Study& stated, const Study& doubled, std::vector<ReproducedRow>& rows) {
+void add_acceptance(const Study& stated, const Study& doubled, Reproduction& table) {
     using enum tang2009::Route;
-    demand_at_most(rows, levels(doubled) + ": joint, rms relative error, %",
-                   drawn_rms(doubled, kJoint1, kAll), 0.5);
-    demand_at_most(rows, levels(stated) + ": joint, rms relative error, %",
-                   drawn_rms(stated, kJoint1, kAll), 1.4);
-    demand_at_least(rows, levels(stated) + ": two-step over joint, all 30",
-                    drawn_ratio(stated, kTwoStep1, kJoint1, kAll), 2);
-    demand_at_least(rows, levels(stated) + ": two-step over joint, bias",
-                    drawn_ratio(stated, kTwoStep1, kJoint1, kBias), 3);
+    using enum Side;
+    demand(table, levels(doubled) + ": joint, rms relative error, %",
+           drawn_rms(doubled, kJoint1, kAll), at_most, 0.5);
+    demand(table, levels(stated) + ": joint, rms relative error, %",
+           drawn_rms(stated, kJoint1, kAll), at_most, 1.4);
+    demand(table, levels(stated) + ": two-step over joint, all 30",
+           drawn_ratio(stated, kTwoStep1, kJoint1, kAll), at_least, 2);
+    demand(table, levels(stated) + ": two-step over joint, bias",
+           drawn_ratio(stated, kTwoStep1, kJoint1, kBias), at_least, 3);
     const std::array<std::pair<Group, double>, 4> kRest{
         {{kBias, 0.3}, {kLinear, 0.35}, {kSquares, 1.0}, {kProducts, 2.2}}};
     for (const auto& [group, limit] : kRest) {
-        demand_at_most(rows, levels(stated) + " with rest: joint, " + group.name + ", %",
-                       drawn_rms(stated, kJointRest, group), limit);
+        demand(table, levels(stated) + " with rest: joint, " + group.name + ", %",
+               drawn_rms(stated, kJointRest, group), at_most, limit);
     }
     for (const Study* study : {&stated, &doubled}) {
         for (const auto& [two_step, joint, trial] :
              {std::tuple{kTwoStep1, kJoint1, 1}, std::tuple{kTwoStep2, kJoint2, 2}}) {
             for (const Group& group : {kAll, kBias, kLinear, kSquares, kProducts}) {
-                demand_at_most(rows,
-                               levels(*study) + formatted(": trial %d, joint over two-step, %s",
-                                                          trial, group.name),
-                               drawn_ratio(*study, joint, two_step, group), 1);
+                demand(table,
+                       levels(*study) +
+                           printed(": trial %d, joint over two-step, %s", trial, group.name),
+                       drawn_ratio(*study, joint, two_step, group), at_most, 1);
             }
         }
     }
@@ -424,25 +389,24 @@ void add_acceptance(const Study& stated, const Study& doubled, std::vector<Repro
 Reproduction reproduce_tang2009(const ReproduceOptions& options) {
     const std::size_t seeds = options.seeds > 0 ? options.seeds : kRigs;
     const std::vector<Study> studies = tang2009::run_studies({1.0, 2.0}, seeds);
-    Reproduction result;
-    result.name = "tang2009";
-    result.title =
-        "Tang, Fu, Yu, Deng 2009: 30 gyro error coefficients, 14 positions of 100 s, 15 Hz";
-    add_coefficients(studies, result.rows);
-    add_errors(studies, result.rows);
-    for (const Study& study : studies) add_findings(study, result.rows);
-    add_printed_trial_3(result.rows);
-    tang2009::add_transmission(result.rows);
-    tang2009::add_level_errors(result.rows);
-    add_acceptance(studies[0], studies[1], result.rows);
-    if (seeds > 1) add_two_sided(studies[0], studies[1], result.rows);
-    for (const Study& study : studies) add_statistics(study, result.rows);
+    Reproduction result{
+        "tang2009",
+        "Tang, Fu, Yu, Deng 2009: 30 gyro error coefficients, 14 positions of 100 s, 15 Hz"};
+    add_coefficients(studies, result);
+    add_errors(studies, result);
+    for (const Study& study : studies) add_findings(study, result);
+    add_printed_trial_3(result);
+    tang2009::add_transmission(result);
+    tang2009::add_level_errors(result);
+    add_acceptance(studies[0], studies[1], result);
+    if (seeds > 1) add_two_sided(studies[0], studies[1], result);
+    for (const Study& study : studies) add_statistics(study, result);
     result.notes.emplace_back(
         "Trial 2 over trial 1, an order worse: at least 10, or the ratio of the Cramer-Rao bounds "
         "less 2 sigma where that is smaller. Section 3.5: an error dk of all three axes gives 2 "
         "dk, "
         "so that the three numbers sum to 14 and z has 6, not 8.");
-    result.notes.push_back(formatted(
+    result.notes.push_back(printed(
         "%zu simulated rigs (seeds 1 to %zu); single coefficients are those of seed 1. +- is one "
         "standard deviation everywhere: of a coefficient what its filter claims, of an rms error "
         "or "
@@ -471,7 +435,7 @@ Reproduction reproduce_tang2009(const ReproduceOptions& options) {
         "by 0.0006 and 0.0009. So no filter gives all of these numbers. Eq. 13 over the first "
         "samples of each dwell gives other kappas, which the errors of trial 1 show.");
     if (!options.plot.empty()) {
-        for (const Study& study : studies) tang2009::plot_convergence(study, options.plot);
+        for (const Study& study : studies) tang2009::add_convergence(study, result);
         result.notes.push_back("charts like Figure 3 are in " + options.plot);
     }
     return result;

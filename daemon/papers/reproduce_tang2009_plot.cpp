@@ -2,11 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <string>
+#include <utility>
 
-#include "daemon/papers/reproduce_text.hpp"
-#include "daemon/plot/chart.hpp"
+#include "daemon/results/text_line.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool::tang2009 {
@@ -28,25 +27,22 @@ constexpr std::array<Line, 5> kLines{{{kTwoStep1, 1, "two-step"},
                                       {kJoint2, 2, "joint"},
                                       {kOneLevel3, 3, "one-level"}}};
 
-void write(const Study& study, const Line& line, std::size_t gyro, const std::string& folder) {
+void add(const Study& study, const Line& line, std::size_t gyro, Reproduction& table) {
     const Convergence& convergence = study.convergence[line.route];
-    plot::Chart chart;
     const char axis = static_cast<char>('x' + gyro);
-    const std::string level = formatted("%.4g", study.platform_g(9));
-    chart.title = formatted("Trial %d, gyro %c, %s, over truth; %s g in the first run of trial 1",
-                            line.trial, axis, line.name, level.c_str());
-    chart.x.label = "time in dwells, min";
-    chart.y.label = "estimate / truth";
+    const std::string level = printed("%.4g", study.platform_g(9));
+    plot::Chart chart{printed("Trial %d, gyro %c, %s, over truth; %s g in the first run of trial 1",
+                              line.trial, axis, line.name, level.c_str()),
+                      plot::Axis("time in dwells, min"), plot::Axis("estimate / truth")};
     chart.y.low = kLow;
     chart.y.high = kHigh;
     chart.y.exact = true;
     for (std::size_t term = 0; term < 10; ++term) {
         const std::size_t i = 10 * gyro + term;
-        plot::Curve curve;
-        curve.name = estimator::parameter_names()[i];
-        curve.x = convergence.minutes;
         // There are more coefficients than colours.
-        if (term >= 4) curve.look = plot::Look::dashed;
+        plot::Curve curve{.name = estimator::parameter_names()[i],
+                          .x = convergence.minutes,
+                          .look = term >= 4 ? plot::Look::dashed : plot::Look::line};
         for (const Coefficients& value : convergence.value) {
             const double ratio = value[i] / truth()[i];
             curve.y.push_back(ratio >= kLow && ratio <= kHigh ? ratio : NAN);
@@ -57,17 +53,16 @@ void write(const Study& study, const Line& line, std::size_t gyro, const std::st
         line.trial == 3 ? "Every 10 s of 14 dwells of 100 s. What is beyond -1 to 3 is left out."
                         : "Every 10 s of 28 dwells of 100 s; the second level begins at 23.3 min. "
                           "What is beyond -1 to 3 is left out.");
-    const std::string name = "tang2009-figure3-" + level + "g-trial" + std::to_string(line.trial) +
-                             "-" + line.name + "-" + axis + ".svg";
-    plot::write_file((std::filesystem::path(folder) / name).string(), chart.svg());
+    table.charts.emplace_back(
+        printed("figure3-%sg-trial%d-%s-%c", level.c_str(), line.trial, line.name, axis),
+        std::move(chart));
 }
 
 }  // namespace
 
-void plot_convergence(const Study& study, const std::string& folder) {
-    plot::make_folder(folder);
+void add_convergence(const Study& study, Reproduction& table) {
     for (const Line& line : kLines) {
-        for (std::size_t gyro = 0; gyro < 3; ++gyro) write(study, line, gyro, folder);
+        for (std::size_t gyro = 0; gyro < 3; ++gyro) add(study, line, gyro, table);
     }
 }
 

@@ -5,7 +5,7 @@
 #include <complex>
 #include <numbers>
 
-#include "daemon/papers/reproduce_text.hpp"
+#include "daemon/results/text_line.hpp"
 #include "estimator/level/paper_level.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "tests/plant/platform_model.hpp"
@@ -157,7 +157,7 @@ double propagated(std::size_t row, std::size_t column) {
 
 /// Last line of section 3.5: what second-order coefficients gain by a wrong amplitude a0',
 /// (a0^2 - a0'^2) / (a0'^2 + 2); printed without "- 1" and with its ratio upside down.
-void add_last_line(std::vector<ReproducedRow>& rows) {
+void add_last_line(Reproduction& table) {
     constexpr double kScale = 1e-3, kAmplitude = 6;
     Errors e;
     for (std::size_t k = 0; k < 3; ++k) e.gain[k][k] = kScale;
@@ -171,96 +171,76 @@ void add_last_line(std::vector<ReproducedRow>& rows) {
         kappa += std::pow(1 + kAmplitude * std::sin(kOmega * kPeriod * n + 0.3), 2) / kSamples;
     }
     const double computed = kappa / (1 + square / 2) - 1;
-    const double printed = (1 + expected / 2) / (1 + truth / 2);
-    rows.push_back({"section 3.5, Delta of second-order terms, scale error 1e-3 of all three axes",
-                    "-",
-                    formatted("%.6f", computed),
-                    std::abs(computed - formula) < 4 * kScale * kScale,
-                    {{"as_printed", printed}, {"corrected", formula}, {"computed", computed}},
-                    formatted("%.6f (as printed), %.6f (corrected)", printed, formula)});
+    const double in_print = (1 + expected / 2) / (1 + truth / 2);
+    table.add("section 3.5, Delta of second-order terms, scale error 1e-3 of all three axes", "-",
+              printed("%.6f", computed), std::abs(computed - formula) < 4 * kScale * kScale,
+              printed("%.6f (as printed), %.6f (corrected)", in_print, formula),
+              {{"as_printed", in_print}, {"corrected", formula}, {"computed", computed}});
 }
 
 /// The figure whose conditions our text does not have. Delta of eq. 13's mean error over Table 1,
 /// for three standard deviations of 1e-4 on every axis, is the nearest plain reading of it.
-void add_figure_without_conditions(std::vector<ReproducedRow>& rows) {
+void add_figure_without_conditions(Reproduction& table) {
     constexpr double kScale = 3e-4, kAmplitude = 6;
     const auto delta = [](double share) {
         const double truth = kAmplitude * kAmplitude;
         const double seen = truth * std::pow(1 + share * kScale / 7, 2);
         return 100 * std::abs(truth - seen) / (seen + 2);
     };
-    rows.push_back(
-        {"section 3.5, Delta, %, conditions not in our text: scale 3e-4 of all axes at 6 g",
-         "0.129",
-         formatted("%.4f by 4, 4, 8 as printed; %.4f by 4, 4, 6", delta(16), delta(14)),
-         {},
-         {{"published", 0.129}, {"as_printed", delta(16)}, {"corrected", delta(14)}}});
+    table.add("section 3.5, Delta, %, conditions not in our text: scale 3e-4 of all axes at 6 g",
+              "0.129", printed("%.4f by 4, 4, 8 as printed; %.4f by 4, 4, 6", delta(16), delta(14)),
+              {}, {}, {{"published", 0.129}, {"as_printed", delta(16)}, {"corrected", delta(14)}});
 }
 
 }  // namespace
 
-void add_transmission(std::vector<ReproducedRow>& rows) {
+void add_transmission(Reproduction& table) {
     for (const auto& [natural, damping] : {std::pair{9.1, 0.2}, std::pair{7.0, 0.1}}) {
         const Mount mount = Mount::of(natural, damping);
         const Response formula = closed_form(mount);
         const Integrated numeric = integrate(mount);
         const std::string name =
-            formatted("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
-        rows.push_back({name + "a0/a at 15 Hz",
-                        "-",
-                        formatted("%.6f (eq. 1 integrated)", numeric.steady.ratio),
-                        std::abs(numeric.steady.ratio - formula.ratio) < 1e-5,
-                        {{"formula", formula.ratio}, {"integrated", numeric.steady.ratio}},
-                        formatted("%.6f (eq. 3)", formula.ratio)});
-        const double printed = phase_as_printed(mount);
-        rows.push_back(
-            {name + "phase, rad",
-             "-",
-             formatted("%.4f", numeric.steady.phase),
-             std::abs(std::remainder(numeric.steady.phase - formula.phase, 2 * std::numbers::pi)) <
-                 1e-4,
-             {{"as_printed", printed},
-              {"corrected", formula.phase},
-              {"integrated", numeric.steady.phase}},
-             formatted("%.4f (eq. 4 as printed), %.4f (corrected)", printed, formula.phase)});
-        rows.push_back({name + "transient X(t), largest difference / amplitude",
-                        "-",
-                        formatted("%.1e", numeric.transient_error),
-                        numeric.transient_error < 1e-4,
-                        {{"largest", numeric.transient_error}},
-                        "0 (eqs 5-7 corrected)"});
+            printed("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
+        table.add(name + "a0/a at 15 Hz", "-",
+                  printed("%.6f (eq. 1 integrated)", numeric.steady.ratio),
+                  std::abs(numeric.steady.ratio - formula.ratio) < 1e-5,
+                  printed("%.6f (eq. 3)", formula.ratio),
+                  {{"formula", formula.ratio}, {"integrated", numeric.steady.ratio}});
+        const double in_print = phase_as_printed(mount);
+        table.add(name + "phase, rad", "-", printed("%.4f", numeric.steady.phase),
+                  std::abs(std::remainder(numeric.steady.phase - formula.phase,
+                                          2 * std::numbers::pi)) < 1e-4,
+                  printed("%.4f (eq. 4 as printed), %.4f (corrected)", in_print, formula.phase),
+                  {{"as_printed", in_print},
+                   {"corrected", formula.phase},
+                   {"integrated", numeric.steady.phase}});
+        table.add(name + "transient X(t), largest difference / amplitude", "-",
+                  printed("%.1e", numeric.transient_error), numeric.transient_error < 1e-4,
+                  "0 (eqs 5-7 corrected)", {{"largest", numeric.transient_error}});
     }
 }
 
-void add_level_errors(std::vector<ReproducedRow>& rows) {
+void add_level_errors(Reproduction& table) {
     const std::array<const char*, 3> axis{"x", "y", "z"};
     const std::array<double, 3> published{4, 4, 8}, corrected{4, 4, 6};
     double sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
         const double value = propagated(k, k);
         sum += value;
-        rows.push_back(
-            {formatted("section 3.5, 7 x error of a0 per scale error of %s", axis[k]),
-             formatted("%.0f", published[k]),
-             formatted("%.3f", value),
-             std::abs(value - corrected[k]) < 0.02,
-             {{"printed", published[k]}, {"corrected", corrected[k]}, {"computed", value}},
-             formatted("%.0f%s", corrected[k], k == 2 ? " (see the note)" : "")});
+        table.add(printed("section 3.5, 7 x error of a0 per scale error of %s", axis[k]),
+                  printed("%.0f", published[k]), printed("%.3f", value),
+                  std::abs(value - corrected[k]) < 0.02,
+                  printed("%.0f%s", corrected[k], k == 2 ? " (see the note)" : ""),
+                  {{"printed", published[k]}, {"corrected", corrected[k]}, {"computed", value}});
     }
-    rows.push_back({"section 3.5, their sum",
-                    "16",
-                    formatted("%.3f", sum),
-                    std::abs(sum - 14) < 0.05,
-                    {{"printed", 16}, {"corrected", 14}, {"computed", sum}},
-                    "14 (see the note)"});
+    table.add("section 3.5, their sum", "16", printed("%.3f", sum), std::abs(sum - 14) < 0.05,
+              "14 (see the note)", {{"printed", 16}, {"corrected", 14}, {"computed", sum}});
     const double misaligned = 0.5 * (propagated(0, 1) + propagated(1, 0));
-    rows.push_back({"section 3.5, the same per misalignment E_xy + E_yx",
-                    "-1",
-                    formatted("%.3f", misaligned),
-                    std::abs(misaligned + 1) < 0.02,
-                    {{"printed", -1}, {"computed", misaligned}}});
-    add_last_line(rows);
-    add_figure_without_conditions(rows);
+    table.add("section 3.5, the same per misalignment E_xy + E_yx", "-1",
+              printed("%.3f", misaligned), std::abs(misaligned + 1) < 0.02, {},
+              {{"printed", -1}, {"computed", misaligned}});
+    add_last_line(table);
+    add_figure_without_conditions(table);
 
     constexpr int kDraws = 12;
     constexpr double kScale = 1e-4, kBias_g = 1e-4, kMisalignment = 50 / 206264.80625;
@@ -285,13 +265,11 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
     }
     eq13 = std::sqrt(eq13 / n);
     projection = std::sqrt(projection / n);
-    rows.push_back(
-        {"rms error of kappa, %, with scale 1e-4, misalignment 50 arcsec, bias 1e-4 g",
-         "-",
-         formatted("eqs 12-13 %.4f, projection on the vertical %.4f", 100 * eq13, 100 * projection),
-         projection < 0.5 * eq13,
-         {{"eqs_12_13", 100 * eq13}, {"projection", 100 * projection}},
-         "other draws: 0.070, 0.019; at most half"});
+    table.add(
+        "rms error of kappa, %, with scale 1e-4, misalignment 50 arcsec, bias 1e-4 g", "-",
+        printed("eqs 12-13 %.4f, projection on the vertical %.4f", 100 * eq13, 100 * projection),
+        projection < 0.5 * eq13, "other draws: 0.070, 0.019; at most half",
+        {{"eqs_12_13", 100 * eq13}, {"projection", 100 * projection}});
 }
 
 }  // namespace vibrig::tool::tang2009

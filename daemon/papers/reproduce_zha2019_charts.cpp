@@ -15,10 +15,7 @@ constexpr double kStart_s = 1.5 * 3600;
 constexpr Way kFast = kWays[2];
 
 plot::Chart tilt_chart(const std::string& title, std::string note = {}) {
-    plot::Chart chart;
-    chart.title = title;
-    chart.x = plot::Axis("time [min]");
-    chart.y = plot::Axis("tilt [arcmin]");
+    plot::Chart chart{title, plot::Axis("time [min]"), plot::Axis("tilt [arcmin]")};
     if (!note.empty()) chart.notes.push_back(std::move(note));
     return chart;
 }
@@ -26,13 +23,12 @@ plot::Chart tilt_chart(const std::string& title, std::string note = {}) {
 /// East, every `step_s`.
 void add_tilt(plot::Chart& chart, const std::string& name, const Scenario& scenario,
               double step_s) {
-    plot::Curve curve{name, {}, {}, {}, {}, plot::Look::line};
+    plot::Curve curve{name};
     double next = 0;
     for (const TracePoint& point : simulate(scenario).trace) {
         if (point.time_s < next) continue;
         next += step_s;
-        curve.x.push_back(point.time_s / 60);
-        curve.y.push_back(point.tilt[0] / kArcmin);
+        curve.add(point.time_s / 60, point.tilt[0] / kArcmin);
     }
     chart.curves.push_back(std::move(curve));
 }
@@ -40,21 +36,18 @@ void add_tilt(plot::Chart& chart, const std::string& name, const Scenario& scena
 /// Eq. 3 over frequency: tilt for an error of the reference velocity.
 plot::Chart networks_chart(const Gains& designed) {
     using Complex = std::complex<double>;
-    plot::Chart chart;
-    chart.title = "Tilt for an error of the reference velocity (eq. 3)";
-    chart.x = plot::Axis("period [s]", true);
-    chart.y = plot::Axis("tilt [arcmin per m/s]", true);
+    plot::Chart chart{"Tilt for an error of the reference velocity (eq. 3)",
+                      plot::Axis("period [s]", true), plot::Axis("tilt [arcmin per m/s]", true)};
     chart.notes.emplace_back("Without a network (H = 1) the reference has no part in it.");
     const Earth earth;
     const auto add = [&](const char* name, const auto& network) {
-        plot::Curve curve{name, {}, {}, {}, {}, plot::Look::line};
+        plot::Curve curve{name};
         for (double period = 10; period < 1e5; period *= 1.05) {
             const Complex s(0, 2 * std::numbers::pi / period);
             const Complex h = network(s);
             const Complex tilt =
                 (1.0 - h) * s / (earth.radius_m * (s * s + h * earth.schuler_squared()));
-            curve.x.push_back(period);
-            curve.y.push_back(std::abs(tilt) / kArcmin);
+            curve.add(period, std::abs(tilt) / kArcmin);
         }
         chart.curves.push_back(std::move(curve));
     };
@@ -125,19 +118,15 @@ plot::Chart drive_chart(bool internal) {
 }
 
 plot::Chart velocity_chart() {
-    plot::Chart chart;
-    chart.title = "The drive (seed 1)";
-    chart.x = plot::Axis("time [min]");
-    chart.y = plot::Axis("velocity [m/s]");
+    plot::Chart chart{"The drive (seed 1)", plot::Axis("time [min]"), plot::Axis("velocity [m/s]")};
     const Scenario scenario = drive(kFast, kPrinted, 1);
     for (std::size_t i = 0; i < 2; ++i) {
-        plot::Curve curve{i == 0 ? "east" : "north", {}, {}, {}, {}, plot::Look::line};
+        plot::Curve curve{i == 0 ? "east" : "north"};
         double velocity = 0;
         for (double t = 0; t < kDrive_s; t += 1) {
             for (const Manoeuvre& m : scenario.motion)
                 velocity += t >= m.from_s && t < m.until_s ? m.acceleration_mps2[i] : 0;
-            curve.x.push_back(t / 60);
-            curve.y.push_back(velocity);
+            curve.add(t / 60, velocity);
         }
         chart.curves.push_back(std::move(curve));
     }

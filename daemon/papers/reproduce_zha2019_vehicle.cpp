@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "daemon/papers/reproduce_text.hpp"
+#include "daemon/results/text_line.hpp"
 
 namespace vibrig::tool::zha2019::drives {
 
@@ -47,13 +47,10 @@ Deviations mean_of(const std::array<Deviations, kSeeds>& drives) {
 }
 
 /// A line of Table 1 or 2: without network, conventional, fast.
-ReproducedRow table_row(const std::string& item, const char* published,
-                        const std::array<double, 3>& found) {
-    return {item,
-            published,
-            formatted("%.3f' %.3f' %.4f'", found[0], found[1], found[2]),
-            {},
-            {{"none", found[0]}, {"conventional", found[1]}, {"fast", found[2]}}};
+void add_line(Reproduction& table, const std::string& item, const char* published,
+              const std::array<double, 3>& found) {
+    table.add(item, published, printed("%.3f' %.3f' %.4f'", found[0], found[1], found[2]), {}, "",
+              {{"none", found[0]}, {"conventional", found[1]}, {"fast", found[2]}});
 }
 
 void add_tables(Reproduction& table) {
@@ -64,12 +61,11 @@ void add_tables(Reproduction& table) {
     constexpr std::array kNames{"Table 1, east", "Table 2, north"};
     for (std::size_t i = 0; i < 2; ++i) {
         for (std::size_t k = 0; k < kSeeds; ++k) {
-            table.rows.push_back(table_row(formatted("%s, drive %zu of 6", kNames[i], k + 1), "-",
-                                           {found[0][k][i], found[1][k][i], found[2][k][i]}));
+            add_line(table, printed("%s, drive %zu of 6", kNames[i], k + 1), "-",
+                     {found[0][k][i], found[1][k][i], found[2][k][i]});
         }
-        table.rows.push_back(
-            table_row(formatted("%s, means of six", kNames[i]), kPublished[i],
-                      {mean_of(found[0])[i], mean_of(found[1])[i], mean_of(found[2])[i]}));
+        add_line(table, printed("%s, means of six", kNames[i]), kPublished[i],
+                 {mean_of(found[0])[i], mean_of(found[1])[i], mean_of(found[2])[i]});
     }
 }
 
@@ -111,27 +107,20 @@ Scenario drive(const Way& way, const Gains& gains, std::uint64_t seed) {
 void add_vehicle(Reproduction& table) {
     add_tables(table);
     const auto designed = mean_of(six_drives(kWays[2], gains_of(0.0088, 0.7)));
-    table.rows.push_back({"means of the six drives, fast network, gains by eqs. 11-14",
-                          "-",
-                          formatted("east %.4f', north %.4f'", designed[0], designed[1]),
-                          {},
-                          {{"east", designed[0]}, {"north", designed[1]}}});
+    table.add("means of the six drives, fast network, gains by eqs. 11-14", "-",
+              printed("east %.4f', north %.4f'", designed[0], designed[1]), {}, {},
+              {{"east", designed[0]}, {"north", designed[1]}});
     const auto internal = mean_of(six_drives({"", Network::bare, true}, kPrinted));
-    table.rows.push_back({"the same without a reference (internal damping, eq. 1)",
-                          "-",
-                          formatted("east %.1f', north %.1f'", internal[0], internal[1]),
-                          {},
-                          {{"east", internal[0]}, {"north", internal[1]}}});
+    table.add("the same without a reference (internal damping, eq. 1)", "-",
+              printed("east %.1f', north %.1f'", internal[0], internal[1]), {}, {},
+              {{"east", internal[0]}, {"north", internal[1]}});
     Scenario still = start(kWays[2], {kPrinted.k1, kPrinted.k2, 0}, 0, 2 * 3600);
     still.drift = {0.1 * kDegPerHour, 0};
     const double tilt = simulate(still).trace.back().tilt[0] / kArcmin;
     const double theory = steady_tilt(still.loop.fast, still.drift[0], 0) / kArcmin;
-    table.rows.push_back({"K3 = 0: tilt that a drift of 0.1 deg/h leaves (eq. 8)",
-                          "-",
-                          formatted("%.4f'", tilt),
-                          std::abs(tilt - theory) <= 1e-3 * std::abs(theory),
-                          {{"computed", tilt}, {"theory", theory}},
-                          formatted("%.4f'", theory)});
+    table.add("K3 = 0: tilt that a drift of 0.1 deg/h leaves (eq. 8)", "-", printed("%.4f'", tilt),
+              std::abs(tilt - theory) <= 1e-3 * std::abs(theory), printed("%.4f'", theory),
+              {{"computed", tilt}, {"theory", theory}});
 }
 
 }  // namespace vibrig::tool::zha2019::drives
