@@ -1,6 +1,11 @@
 #pragma once
 
+// Of CLI11 whatever a command needs: App.hpp alone does not link.
 #include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <memory>
 
 #include "daemon/results/exit_status.hpp"
 
@@ -30,8 +35,30 @@ void add_replay(CLI::App& app, int& exit_code);
 void add_reports(CLI::App& app, int& exit_code);  ///< report, compensate
 void add_list(CLI::App& app, int& exit_code);
 void add_trend(CLI::App& app, int& exit_code);
-void add_archive(CLI::App& app, int& exit_code);  ///< archive add, verify, serve
+void add_archive(CLI::App& app, int& exit_code);  ///< archive add, verify
+void add_archive_serve(CLI::App& group, int& exit_code);
+void add_archive_type(CLI::App& group, int& exit_code);
 void add_certificate(CLI::App& app, int& exit_code);
 void add_recordings(CLI::App& app, int& exit_code);  ///< export, recover
+
+/// A command, and where its options are kept.
+template <class Options>
+struct Command {
+    CLI::App& app;
+    Options& options;
+};
+
+/// Adds to `group` a command whose body is guarded() once its options are read.
+template <class Options>
+[[nodiscard]] Command<Options> add_command(CLI::App& group, int& exit_code, const char* name,
+                                           const char* help, int (*run)(const Options&),
+                                           const char* who = "") {
+    const auto options = std::make_shared<Options>();
+    CLI::App& app = *group.add_subcommand(name, help);
+    app.callback([options, run, who, &exit_code] {
+        exit_code = guarded([&] { return run(*options); }, who);
+    });
+    return {app, *options};
+}
 
 }  // namespace vibrig::tool

@@ -1,7 +1,4 @@
 // What is on a bus of which nobody has a DBC. Listens only, needs no daemon.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cmath>
@@ -286,50 +283,47 @@ int list_bus(const BusOptions& options) {
 }  // namespace
 
 void add_commission_bus(CLI::App& commissioning, int& exit_code) {
-    CLI::App& command = *commissioning.add_subcommand(
-        "bus",
+    const auto [command, options] = add_command<BusOptions>(
+        commissioning, exit_code, "bus",
         "List what is on a bus of which there is no DBC: identifiers, periods, bytes that "
-        "change. Listens only, needs no daemon");
-    auto options = std::make_shared<BusOptions>();
-    command.add_option("--interface", options->interface, "CAN interface, such as can0");
-    command.add_option("--seqpacket", options->seqpacket, "Unix socket of a simulated rig's bus");
-    command.add_option("--candump", options->candump, "A log of candump -l instead of a bus");
-    command.add_option("--for", options->seconds, "How long to listen, s")
+        "change. Listens only, needs no daemon",
+        list_bus, "vibrig commission bus: ");
+    command.add_option("--interface", options.interface, "CAN interface, such as can0");
+    command.add_option("--seqpacket", options.seqpacket, "Unix socket of a simulated rig's bus");
+    command.add_option("--candump", options.candump, "A log of candump -l instead of a bus");
+    command.add_option("--for", options.seconds, "How long to listen, s")
         ->capture_default_str()
         ->check(CLI::Range(0.5, 3600.0));
-    command.add_flag("--turn", options->turn,
+    command.add_flag("--turn", options.turn,
                      "Listen as long once more while somebody turns one gimbal: which bytes change "
                      "only then");
     command
-        .add_option("--turn-at", options->turn_at,
+        .add_option("--turn-at", options.turn_at,
                     "Of a log: s from its beginning on which one gimbal is turned")
         ->check(CLI::Range(0.5, 1e5));
     command.add_option(
-        "--dbc", options->dbc,
+        "--dbc", options.dbc,
         "Its signals, too: range and noise, and which one follows the gimbal that is "
         "turned");
-    command.add_flag("--bits", options->bits,
+    command.add_flag("--bits", options.bits,
                      "Then have each bit that never changed (valid bits, loop closed, ready, "
                      "fault) changed once by hand, or confirmed by two persons");
     command.add_flag(
-        "--find", options->find,
+        "--find", options.find,
         "Instead: each gimbal is turned by hand in turn, which names its angle; "
         "can.dbc, can.signals.* and can.sample_rate_hz go into found.toml of --folder");
     command
-        .add_option("--config", options->configuration,
+        .add_option("--config", options.configuration,
                     "--find: a configuration whose can.sample_rate_hz has to be the rate measured")
         ->check(CLI::ExistingFile);
-    command.add_option("--by", options->by, "Who changes bits, or turns gimbals");
-    command.add_option("--folder", options->folder,
+    command.add_option("--by", options.by, "Who changes bits, or turns gimbals");
+    command.add_option("--folder", options.folder,
                        "commission.folder, where what is proven or found is kept");
-    command.add_flag("--json", options->json, "As JSON");
+    command.add_flag("--json", options.json, "As JSON");
     command.footer(
         "Example: vibrig commission bus --interface can0 --turn --dbc rig.dbc\n"
         "Exit code 0: frames were heard, and if asked one signal follows, or all was found; 1: not "
         "so.");
-    command.callback([&exit_code, options] {
-        exit_code = guarded([&] { return list_bus(*options); }, "vibrig commission bus: ");
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,13 +1,9 @@
 // Where a foreign controller keeps what its display shows. Reads only: what is below has no
 // function that writes. What writes is commission_trial.cpp.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -137,6 +133,7 @@ std::optional<std::vector<proto::Register>> places_by_values(ReadingLink& link,
 }
 
 int find_registers(const RegisterOptions& options) {
+    if (options.write) return try_registers(options);
     std::ostream& out = options.json ? std::cerr : std::cout;
     ReadingLink link(options);
     std::string device = link.device();
@@ -188,49 +185,44 @@ std::string typed_line(std::ostream& out) {
 }
 
 void add_commission_registers(CLI::App& commissioning, int& exit_code) {
-    CLI::App& command = *commissioning.add_subcommand(
-        "registers",
+    const auto [command, options] = add_command<RegisterOptions>(
+        commissioning, exit_code, "registers",
         "Find where a shaker's controller keeps frequency and amplitude, from what its display "
         "shows: reads only. With --write, try the registers that a configuration states, one by "
-        "one, while nothing can move. Needs no daemon");
-    auto options = std::make_shared<RegisterOptions>();
-    command.add_option("--by", options->by, "Who stands at the panel")->required();
-    command.add_option("--tcp", options->tcp, "Modbus TCP, HOST or HOST:PORT (502)");
-    command.add_option("--device", options->device, "Modbus RTU, serial device (8E1)");
-    command.add_option("--plate", options->plate,
+        "one, while nothing can move. Needs no daemon",
+        find_registers, "vibrig commission registers: ");
+    command.add_option("--by", options.by, "Who stands at the panel")->required();
+    command.add_option("--tcp", options.tcp, "Modbus TCP, HOST or HOST:PORT (502)");
+    command.add_option("--device", options.device, "Modbus RTU, serial device (8E1)");
+    command.add_option("--plate", options.plate,
                        "Maker, type and firmware on its plate, of a device that does not say them "
                        "by function 17");
-    command.add_option("--baud", options->baud, "Of the serial device")->capture_default_str();
-    command.add_option("--unit", options->unit, "Modbus unit")
+    command.add_option("--baud", options.baud, "Of the serial device")->capture_default_str();
+    command.add_option("--unit", options.unit, "Modbus unit")
         ->capture_default_str()
         ->check(CLI::Range(0, 247));
-    command.add_option("--holding", options->holding, "How many holding registers, from 0 on")
+    command.add_option("--holding", options.holding, "How many holding registers, from 0 on")
         ->capture_default_str()
         ->check(CLI::Range(1, 1024));
-    command.add_option("--input", options->input, "How many input registers, from 0 on")
+    command.add_option("--input", options.input, "How many input registers, from 0 on")
         ->capture_default_str()
         ->check(CLI::Range(0, 1024));
     auto* const write = command.add_flag(
-        "--write", options->write,
+        "--write", options.write,
         "Try the registers that --config states: the stop chain by hand, then with the chain open "
         "and the power stage off each one whose name is typed; the vibrigd of this rig is stopped");
-    auto* const file = command.add_option("--config", options->configuration,
+    auto* const file = command.add_option("--config", options.configuration,
                                           "The daemon's configuration file, for --write");
     write->needs(file);
     file->needs(write);
     for (const char* reading : {"--tcp", "--device", "--baud", "--unit", "--holding", "--input"})
         write->excludes(command.get_option(reading));
-    command.add_flag("--json", options->json, "As JSON; the dialogue goes to standard error");
+    command.add_flag("--json", options.json, "As JSON; the dialogue goes to standard error");
     command.footer(
         "Example: vibrig commission registers --by 'Ada Lovelace' --tcp 192.0.2.7\n"
         "  vibrig commission registers --by 'Ada Lovelace' --write --config "
         "/etc/vibrig/vibrigd.toml\n"
         "Exit code 0: one place each, or all was tried and passed; 1: several, none, or not.");
-    command.callback([&exit_code, options] {
-        exit_code = guarded(
-            [&] { return options->write ? try_registers(*options) : find_registers(*options); },
-            "vibrig commission registers: ");
-    });
 }
 
 }  // namespace vibrig::tool

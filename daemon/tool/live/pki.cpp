@@ -4,17 +4,12 @@
 #include <sys/types.h>
 #include <unistd.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <memory>
 #include <set>
 #include <sstream>
 
-#include "daemon/results/exit_status.hpp"
 #include "daemon/tool/commands.hpp"
 
 namespace vibrig::tool {
@@ -163,19 +158,19 @@ void add_pki(CLI::App& app, int& exit_code) {
     pki.footer(
         "Example: vibrig pki init --host rig.lab --operator ada --viewer wall\n"
         "More: vibrig pki init --help, vibrig pki revoke --help");
-    CLI::App& making =
-        *pki.add_subcommand("init", "Make an authority, a server's certificate and people's");
-    auto options = std::make_shared<PkiOptions>();
-    making.add_option("--folder", options->folder, "Where they go")->capture_default_str();
-    making.add_option("--host", options->hosts,
+    const auto [making, options] = add_command<PkiOptions>(
+        pki, exit_code, "init", "Make an authority, a server's certificate and people's", init,
+        "vibrig: ");
+    making.add_option("--folder", options.folder, "Where they go")->capture_default_str();
+    making.add_option("--host", options.hosts,
                       "Name or address of the rig's machine, as people will type it");
-    making.add_option("--viewer", options->viewers, "Who may look");
-    making.add_option("--operator", options->operators, "Who may command");
-    making.add_option("--admin", options->admins, "Who may administer");
-    making.add_option("--days", options->days, "Validity; the authority's is four times as long")
+    making.add_option("--viewer", options.viewers, "Who may look");
+    making.add_option("--operator", options.operators, "Who may command");
+    making.add_option("--admin", options.admins, "Who may administer");
+    making.add_option("--days", options.days, "Validity; the authority's is four times as long")
         ->check(CLI::Range(1, 3650))
         ->capture_default_str();
-    making.add_option("--p12-password", options->password, "Of the files for browsers");
+    making.add_option("--p12-password", options.password, "Of the files for browsers");
     making.footer(
         "Example: vibrig pki init --host rig.lab --host 10.0.0.5 --operator ada --viewer wall\n"
         "Again, with other names, it adds them. On the rig:\n"
@@ -184,20 +179,16 @@ void add_pki(CLI::App& app, int& exit_code) {
         "  certificate = \"server.crt\"\n"
         "  key = \"server.key\"\n"
         "  clients_ca = \"authority.crt\"");
-    making.callback(
-        [options, &exit_code] { exit_code = guarded([&] { return init(*options); }, "vibrig: "); });
-    CLI::App& revoking =
-        *pki.add_subcommand("revoke", "Make people's certificates worthless before their time");
-    revoking.add_option("--folder", options->folder, "Where they are")->capture_default_str();
-    revoking.add_option("name", options->revoked, "Whose")->required();
+    const auto [revoking, of] = add_command<PkiOptions>(
+        pki, exit_code, "revoke", "Make people's certificates worthless before their time", revoke,
+        "vibrig: ");
+    revoking.add_option("--folder", of.folder, "Where they are")->capture_default_str();
+    revoking.add_option("name", of.revoked, "Whose")->required();
     revoking.footer(
         "Example: vibrig pki revoke ada\n"
         "On the rig, which takes a changed list over by itself and ends connections:\n"
         "  [server]\n"
         "  revoked = \"revoked.crl\"");
-    revoking.callback([options, &exit_code] {
-        exit_code = guarded([&] { return revoke(*options); }, "vibrig: ");
-    });
 }
 
 }  // namespace vibrig::tool

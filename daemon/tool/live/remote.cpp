@@ -5,16 +5,12 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <memory>
 #include <thread>
 
-#include "daemon/results/exit_status.hpp"
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
@@ -232,29 +228,26 @@ int send_command(const CommandOptions& options) {
     return is_no(reply.status) ? kNo : kBadInput;
 }
 
-void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
-                 const char* help) {
-    CLI::App& command = *app.add_subcommand(name, help);
-    auto options = std::make_shared<CommandOptions>();
-    options->kind = kind;
-    options->at.expired_too = kind == v1::Command::abort;
-    options->by = login_name();
-    add_socket(command, options->at);
-    command.add_option("--by", options->by, "Who commands; goes into the event log")
+void add_order(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
+               const char* help) {
+    const auto [command, options] =
+        add_command<CommandOptions>(app, exit_code, name, help, send_command, kWho);
+    options.kind = kind;
+    options.at.expired_too = kind == v1::Command::abort;
+    options.by = login_name();
+    add_socket(command, options.at);
+    command.add_option("--by", options.by, "Who commands; goes into the event log")
         ->capture_default_str();
-    command.add_flag("--json", options->json, "Print the daemon's answer as JSON");
+    command.add_flag("--json", options.json, "Print the daemon's answer as JSON");
     std::string example = std::string("Example: vibrig ") + name;
     if (kind == v1::Command::acknowledge) {
         command
-            .add_option("what", options->argument,
+            .add_option("what", options.argument,
                         "What is acknowledged, as `vibrig status` names it")
             ->required();
         example += " trip";
     }
     command.footer(example + " --by 'Ada Lovelace'");
-    command.callback([options, &exit_code] {
-        exit_code = guarded([&] { return send_command(*options); }, kWho);
-    });
 }
 
 }  // namespace
@@ -320,88 +313,75 @@ v1::Status ask_status(serve::Client& client) {
 }
 
 void add_remote(CLI::App& app, int& exit_code) {
-    CLI::App& status = *app.add_subcommand("status", "What a running vibrigd does");
-    auto status_options = std::make_shared<StatusOptions>();
-    add_socket(status, status_options->at);
-    status.add_flag("--json", status_options->json, "As JSON (vibrig.v1.Status)");
+    const auto [status, status_options] = add_command<StatusOptions>(
+        app, exit_code, "status", "What a running vibrigd does", show_status, kWho);
+    add_socket(status, status_options.at);
+    status.add_flag("--json", status_options.json, "As JSON (vibrig.v1.Status)");
     status.footer(
         "Example: vibrig status --json\n"
         "Remotely: vibrig status --host rig.lab --identity vibrig-pki/ada");
-    status.callback([status_options, &exit_code] {
-        exit_code = guarded([&] { return show_status(*status_options); }, kWho);
-    });
 
-    CLI::App& testing = *app.add_subcommand(
-        "selftest", "What is looked at before a campaign; exit code 1 unless all is well");
-    auto test_options = std::make_shared<TestOptions>();
+    const auto [testing, test_options] = add_command<TestOptions>(
+        app, exit_code, "selftest",
+        "What is looked at before a campaign; exit code 1 unless all is well", self_test, kWho);
     testing.add_option(
-        "--by", test_options->by,
+        "--by", test_options.by,
         "Who orders a loop check and a proof of the safe state first, about a minute "
         "at selftest.table_g: the bands of [selftest], then whether the table stops "
         "by order and when nobody feeds its watchdog");
     testing
-        .add_flag("--emergency-stop", test_options->emergency_stop,
+        .add_flag("--emergency-stop", test_options.emergency_stop,
                   "Ask for the emergency stop at the end, too; it trips as ever")
         ->needs("--by");
     testing
         .add_flag(
-            "--at-zero", test_options->at_zero,
+            "--at-zero", test_options.at_zero,
             "Instead: the controller runs at 0 g, and its watchdog stops it twice, the second "
             "time with the link closed; half a minute, and nothing moves")
         ->needs("--by");
     testing
         .add_flag(
-            "--rest", test_options->rest,
+            "--rest", test_options.rest,
             "Instead: the opening check of a campaign alone, 4 minutes. Gimbals move, nothing "
             "shakes; it ends with this tool. Exit code 1: something is off, with the keys "
             "that would explain it")
         ->excludes("--at-zero", "--emergency-stop");
-    add_socket(testing, test_options->at);
-    testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
+    add_socket(testing, test_options.at);
+    testing.add_flag("--json", test_options.json, "As JSON (vibrig.v1.Readiness)");
     testing.footer(
         "Example: vibrig selftest\n"
         "With loop check and proof, which vibrig abort ends at any moment: vibrig selftest --by "
         "'Ada "
         "Lovelace' && vibrig arm --by 'Ada Lovelace'");
-    testing.callback([test_options, &exit_code] {
-        exit_code = guarded([&] { return self_test(*test_options); }, kWho);
-    });
 
-    CLI::App& watching = *app.add_subcommand("watch", "The status as a live table");
-    auto watch_options = std::make_shared<WatchOptions>();
-    add_socket(watching, watch_options->at);
+    const auto [watching, watch_options] = add_command<WatchOptions>(
+        app, exit_code, "watch", "The status as a live table", watch, kWho);
+    add_socket(watching, watch_options.at);
     watching.add_flag(
-        "--until-finished", watch_options->until_finished,
+        "--until-finished", watch_options.until_finished,
         "End with the campaign: exit code 0 when it finished and its result is valid or doubtful, "
         "1 when that is not valid, or when it was aborted or tripped");
-    watching.add_flag("--strict", watch_options->strict,
+    watching.add_flag("--strict", watch_options.strict,
                       "With --until-finished: a doubtful result is a no as well");
-    watching.add_option("--interval", watch_options->interval_s, "Time between two looks, s")
+    watching.add_option("--interval", watch_options.interval_s, "Time between two looks, s")
         ->check(proto::finite(0.05, 3600))
         ->capture_default_str();
     watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
-    watching.callback([watch_options, &exit_code] {
-        exit_code = guarded([&] { return watch(*watch_options); }, kWho);
-    });
 
-    CLI::App& events = *app.add_subcommand("events", "What happened, oldest first");
-    auto event_options = std::make_shared<EventOptions>();
-    add_socket(events, event_options->at);
-    events.add_flag("--follow", event_options->follow, "Go on with what comes");
-    events.add_flag("--json", event_options->json, "One JSON object per line (vibrig.v1.Event)");
+    const auto [events, event_options] = add_command<EventOptions>(
+        app, exit_code, "events", "What happened, oldest first", show_events, kWho);
+    add_socket(events, event_options.at);
+    events.add_flag("--follow", event_options.follow, "Go on with what comes");
+    events.add_flag("--json", event_options.json, "One JSON object per line (vibrig.v1.Event)");
     events.footer("Example: vibrig events --follow");
-    events.callback([event_options, &exit_code] {
-        exit_code = guarded([&] { return show_events(*event_options); }, kWho);
-    });
 
-    add_command(app, exit_code, v1::Command::arm, "arm", "Arm the shaker for one campaign");
-    add_command(app, exit_code, v1::Command::start, "start", "Start the armed campaign");
-    add_command(app, exit_code, v1::Command::pause, "pause",
-                "Pause at rest before the next position");
-    add_command(app, exit_code, v1::Command::resume, "resume", "Go on after a pause");
-    add_command(app, exit_code, v1::Command::abort, "abort",
-                "Stop the shaker and end the campaign");
-    add_command(app, exit_code, v1::Command::acknowledge, "ack", "Acknowledge a trip or an alarm");
+    add_order(app, exit_code, v1::Command::arm, "arm", "Arm the shaker for one campaign");
+    add_order(app, exit_code, v1::Command::start, "start", "Start the armed campaign");
+    add_order(app, exit_code, v1::Command::pause, "pause",
+              "Pause at rest before the next position");
+    add_order(app, exit_code, v1::Command::resume, "resume", "Go on after a pause");
+    add_order(app, exit_code, v1::Command::abort, "abort", "Stop the shaker and end the campaign");
+    add_order(app, exit_code, v1::Command::acknowledge, "ack", "Acknowledge a trip or an alarm");
 }
 
 std::string refusal_of(serve::Client& client, const v1::Command& command) {

@@ -1,7 +1,4 @@
 // vibrig archive add and verify.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -13,8 +10,6 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
-#include "daemon/tool/recordings/archive_serve.hpp"
-#include "daemon/tool/recordings/archive_type.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {
@@ -60,8 +55,14 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
     std::cout << std::flush;
 }
 
-int add(const std::vector<std::string>& folders, const ArchiveOptions& options, bool json) {
-    Whereabouts at = whereabouts_of(options);
+struct AddOptions {
+    std::vector<std::string> folders;
+    bool json = false;
+    ArchiveOptions where = {};
+};
+
+int add(const AddOptions& o) {
+    Whereabouts at = whereabouts_of(o.where);
     if (at.place.folder.empty()) {
         if (at.named)
             throw std::runtime_error(
@@ -71,7 +72,7 @@ int add(const std::vector<std::string>& folders, const ArchiveOptions& options, 
         at.place = {".", archive::index_in(".")};
     }
     int code = 0;
-    for (const auto& given : folders) {
+    for (const auto& given : o.folders) {
         const auto found = archive::campaign_folders(given);
         if (found.empty())
             throw std::runtime_error(given +
@@ -92,7 +93,7 @@ int add(const std::vector<std::string>& folders, const ArchiveOptions& options, 
                                   .results(filter);
                 }
                 tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
-                              history.size(), json);
+                              history.size(), o.json);
             } catch (const std::exception& error) {
                 if (found.size() == 1) throw;
                 std::cerr << error.what() << '\n';
@@ -106,10 +107,11 @@ int add(const std::vector<std::string>& folders, const ArchiveOptions& options, 
 struct VerifyOptions {
     std::string recordings;
     bool quick = false, json = false;
+    ArchiveOptions where = {};
 };
 
-int verify(const VerifyOptions& o, const ArchiveOptions& options) {
-    const Whereabouts at = whereabouts_of(options);
+int verify_archive(const VerifyOptions& o) {
+    const Whereabouts at = whereabouts_of(o.where);
     if (at.place.folder.empty())
         throw std::runtime_error(
             "found no archive here, in $VIBRIG_ARCHIVE or in a configuration, expected --archive "
@@ -147,52 +149,41 @@ void add_archive(CLI::App& app, int& exit_code) {
     group->footer(
         "Example: vibrig archive add /var/lib/vibrig/demo-20260301T080000Z --archive /lab/archive");
     group->require_subcommand(1);
-    auto where = std::make_shared<ArchiveOptions>();
 
-    struct AddOptions {
-        std::vector<std::string> folders;
-        bool json = false;
-    };
-    auto to_add = std::make_shared<AddOptions>();
-    CLI::App* adding = group->add_subcommand(
-        "add", "Copies campaigns into an archive, verifies the copies and registers them");
-    adding->add_option("FOLDER", to_add->folders, "of a campaign, or of campaigns")->required();
-    adding->add_flag("--json", to_add->json, "print what was done as JSON, a line each");
-    adding->add_option("--rig", where->rig,
-                       "whose they are (default: of --config, else this machine's name)");
-    add_archive_options(*adding, where);
-    adding->footer(
+    const auto [adding, to_add] = add_command<AddOptions>(
+        *group, exit_code, "add",
+        "Copies campaigns into an archive, verifies the copies and registers them", add);
+    adding.add_option("FOLDER", to_add.folders, "of a campaign, or of campaigns")->required();
+    adding.add_flag("--json", to_add.json, "print what was done as JSON, a line each");
+    adding.add_option("--rig", to_add.where.rig,
+                      "whose they are (default: of --config, else this machine's name)");
+    add_archive_options(adding, to_add.where);
+    adding.footer(
         "Example: vibrig archive add /var/lib/vibrig/demo-20260301T080000Z --archive /lab/archive\n"
         "Again it changes nothing; what was damaged in the archive is mended. A folder that lies "
         "in\n"
         "the archive is registered where it is; the archive is the current folder if none is "
         "named.\n"
         "Exit codes: 0, 1 one of several could not be added, 2 bad usage or input.");
-    adding->callback([to_add, where, &exit_code] {
-        exit_code = guarded([&] { return add(to_add->folders, *where, to_add->json); });
-    });
 
-    add_archive_serve(*group, where, exit_code);
-    add_archive_type(*group, where, exit_code);
+    add_archive_serve(*group, exit_code);
+    add_archive_type(*group, exit_code);
 
-    auto to_verify = std::make_shared<VerifyOptions>();
-    CLI::App* verifying = group->add_subcommand(
-        "verify",
-        "Compares every campaign of an archive with its index, and with a rig's recordings");
-    verifying->add_option("--recordings", to_verify->recordings,
-                          "a rig's recordings, to be compared too (default: of --config)");
-    verifying->add_option("--rig", where->rig,
-                          "whose they are (default: of --config, else this machine's name)");
-    verifying->add_flag("--quick", to_verify->quick, "look at the files' lengths alone");
-    verifying->add_flag("--json", to_verify->json, "print the findings as JSON");
-    add_archive_options(*verifying, where);
-    verifying->footer(
+    const auto [verifying, to_verify] = add_command<VerifyOptions>(
+        *group, exit_code, "verify",
+        "Compares every campaign of an archive with its index, and with a rig's recordings",
+        verify_archive);
+    verifying.add_option("--recordings", to_verify.recordings,
+                         "a rig's recordings, to be compared too (default: of --config)");
+    verifying.add_option("--rig", to_verify.where.rig,
+                         "whose they are (default: of --config, else this machine's name)");
+    verifying.add_flag("--quick", to_verify.quick, "look at the files' lengths alone");
+    verifying.add_flag("--json", to_verify.json, "print the findings as JSON");
+    add_archive_options(verifying, to_verify.where);
+    verifying.footer(
         "Example: vibrig archive verify --config /etc/vibrig/vibrigd.toml\n"
         "Exit codes: 0, 1 something is missing, short, different or not in the index, 2 bad usage "
         "or input.");
-    verifying->callback([to_verify, where, &exit_code] {
-        exit_code = guarded([&] { return verify(*to_verify, *where); });
-    });
 }
 
 }  // namespace vibrig::tool

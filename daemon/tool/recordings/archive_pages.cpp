@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "daemon/archive/trend.hpp"
 #include "daemon/plot/xml_text.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/serve/api.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
@@ -38,12 +38,6 @@ img { width: 100%; height: auto; }
 .note { opacity: .8; }
 )";
 
-std::string number(const char* format, double value) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), format, value);
-    return text.data();
-}
-
 /// As it stands in a link.
 std::string in_link(const std::string& text) {
     std::string out;
@@ -53,9 +47,7 @@ std::string in_link(const std::string& text) {
             out += c;
             continue;
         }
-        std::array<char, 4> hex{};
-        std::snprintf(hex.data(), hex.size(), "%%%02X", byte);
-        out += hex.data();
+        out += printed("%%%02X", byte);
     }
     return out;
 }
@@ -116,8 +108,8 @@ std::string campaign_rows(const std::vector<archive::Entry>& campaigns) {
 
 std::string instability(const archive::Instability& of) {
     if (!of.tested) return "<td class=\"number\">&ndash;</td><td class=\"number\">&ndash;</td>";
-    return "<td class=\"number\">" + number("%.4f", of.value) + "</td><td class=\"number\">" +
-           number("%.2g", of.p) + "</td>";
+    return "<td class=\"number\">" + printed("%.4f", of.value) + "</td><td class=\"number\">" +
+           printed("%.2g", of.p) + "</td>";
 }
 
 std::vector<archive::Entry> of_unit(archive::Index& index, const std::string& serial) {
@@ -163,12 +155,12 @@ std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) con
     for (const auto& of : trend.coefficients) {
         const std::string name = estimator::parameter_names()[of.position];
         const auto& newest = of.points.back();
-        rows += "<tr><th>" + name + "</th><td class=\"number\">" + number("%.5f", of.mean) +
-                "</td><td class=\"number\">" + number("%.5f", of.mean_low) + " .. " +
-                number("%.5f", of.mean_high) + "</td>" + instability(of.operating) +
+        rows += "<tr><th>" + name + "</th><td class=\"number\">" + printed("%.5f", of.mean) +
+                "</td><td class=\"number\">" + printed("%.5f", of.mean_low) + " .. " +
+                printed("%.5f", of.mean_high) + "</td>" + instability(of.operating) +
                 instability(of.shutdown) + "<td class=\"number\">" +
-                number("%.5f", newest.of.value) + " &plusmn; " +
-                number("%.5f", newest.of.expanded) + "</td><td>" +
+                printed("%.5f", newest.of.value) + " &plusmn; " +
+                printed("%.5f", newest.of.expanded) + "</td><td>" +
                 estimator::parameter_unit(of.position) + "</td></tr>";
         charts += "<img loading=\"lazy\" alt=\"" + name +
                   " over the campaigns\" src=\"/chart?serial=" + in_link(serial) +
@@ -177,7 +169,7 @@ std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) con
             if (point.outlier)
                 outliers += "<li class=\"outlier\">" + name + " of " +
                             plot::xml_text(trend.campaigns[point.campaign].key) + ": " +
-                            number("%.5f", point.of.value) + ", t = " + number("%.1f", point.t) +
+                            printed("%.5f", point.of.value) + ", t = " + printed("%.1f", point.t) +
                             "</li>";
     }
     return page(
@@ -199,9 +191,9 @@ std::string ArchivePages::campaign(archive::Index& index, const archive::Entry& 
     for (std::size_t i = 0; i < entry.coefficients.size(); ++i)
         if (const auto& c = entry.coefficients[i])
             rows += std::string("<tr><th>") + estimator::parameter_names()[i] +
-                    "</th><td class=\"number\">" + number("%.6f", c->value) +
-                    "</td><td class=\"number\">" + number("%.6f", c->u) +
-                    "</td><td class=\"number\">" + number("%.6f", c->expanded) + "</td><td>" +
+                    "</th><td class=\"number\">" + printed("%.6f", c->value) +
+                    "</td><td class=\"number\">" + printed("%.6f", c->u) +
+                    "</td><td class=\"number\">" + printed("%.6f", c->expanded) + "</td><td>" +
                     estimator::parameter_unit(i) + "</td></tr>";
     auto all = index.files(entry.key);
     if (fs::exists(fs::path(place_.folder) / entry.key / "report.html"))
@@ -211,8 +203,9 @@ std::string ArchivePages::campaign(archive::Index& index, const archive::Entry& 
                  "\">" + plot::xml_text(file.name) + "</a>" +
                  (file.bytes > 0 ? " " + std::to_string(file.bytes) + " bytes" : "") + "</li>";
     for (const auto& of : entry.temperatures)
-        around += "<li>" + plot::xml_text(of.sensor) + ": " + number("%.2f", of.mean) +
-                  " &deg;C, " + number("%.2f", of.low) + " .. " + number("%.2f", of.high) + "</li>";
+        around += "<li>" + plot::xml_text(of.sensor) + ": " + printed("%.2f", of.mean) +
+                  " &deg;C, " + printed("%.2f", of.low) + " .. " + printed("%.2f", of.high) +
+                  "</li>";
     for (const auto& of : entry.instruments)
         around += "<li>" +
                   plot::xml_text(of.name + " " + of.serial + " " + of.certificate + " " + of.due) +

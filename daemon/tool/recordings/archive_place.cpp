@@ -47,15 +47,15 @@ std::string date_text(std::int64_t utc_ns, const char* format) {
 
 }  // namespace
 
-void add_archive_options(CLI::App& command, const std::shared_ptr<ArchiveOptions>& options) {
-    command.add_option("--archive", options->archive,
+void add_archive_options(CLI::App& command, ArchiveOptions& options) {
+    command.add_option("--archive", options.archive,
                        "the archive's folder, or its index on a server, postgresql://... (default: "
                        "$VIBRIG_ARCHIVE, else recordings.sqlite3 here, in $VIBRIG_RECORDINGS or in "
                        "/var/lib/vibrig)");
-    command.add_option("--index", options->index,
+    command.add_option("--index", options.index,
                        "its index, postgresql://... (default: $VIBRIG_ARCHIVE_INDEX, else "
                        "recordings.sqlite3 in the folder)");
-    command.add_option("--config", options->config, "vibrigd's configuration, which has [archive]");
+    command.add_option("--config", options.config, "vibrigd's configuration, which has [archive]");
 }
 
 Whereabouts whereabouts_of(const ArchiveOptions& options) {

@@ -16,7 +16,7 @@ struct ArchiveOptions {
 };
 
 /// --archive, --index and --config.
-void add_archive_options(CLI::App& command, const std::shared_ptr<ArchiveOptions>& options);
+void add_archive_options(CLI::App& command, ArchiveOptions& options);
 
 struct Whereabouts {
     archive::Place place;

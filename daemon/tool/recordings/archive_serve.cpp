@@ -1,15 +1,13 @@
-#include "daemon/tool/recordings/archive_serve.hpp"
-
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
+// vibrig archive serve: the archive for a browser.
 #include <csignal>
 #include <filesystem>
 #include <iostream>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/results/exit_status.hpp"
 #include "daemon/serve/status_server.hpp"
+#include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_pages.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::tool {
@@ -39,17 +37,19 @@ class NoRig final : public StatusSource {
 
 struct ServeOptions {
     std::string page, remote, certificate, key, clients_ca, revoked;
+    ArchiveOptions where = {};
 };
 
-int serve_archive(ServeOptions o, const ArchiveOptions& where) {
-    const Whereabouts at = whereabouts_of(where);
+int serve_archive(const ServeOptions& options) {
+    ServeOptions o = options;
+    const Whereabouts at = whereabouts_of(o.where);
     if (at.place.folder.empty() || !std::filesystem::is_directory(at.place.folder))
         throw std::runtime_error("--archive: found '" + at.place.folder +
                                  "', expected the archive's folder");
     // It would be seen with the first page only.
     archive::Index(at.place.index, archive::Database::Mode::read);
-    if (!where.config.empty()) {
-        const auto server = configuration::load(where.config, false).configuration.server;
+    if (!o.where.config.empty()) {
+        const auto server = configuration::load(o.where.config, false).configuration.server;
         for (auto [to, from] : {std::pair{&o.certificate, &server.certificate},
                                 {&o.key, &server.key},
                                 {&o.clients_ca, &server.clients_ca},
@@ -97,31 +97,27 @@ int serve_archive(ServeOptions o, const ArchiveOptions& where) {
 
 }  // namespace
 
-void add_archive_serve(CLI::App& group, const std::shared_ptr<ArchiveOptions>& where,
-                       int& exit_code) {
-    auto options = std::make_shared<ServeOptions>();
-    CLI::App* command = group.add_subcommand(
-        "serve", "Shows an archive in a browser; nothing can be changed there");
-    command->add_option("--page", options->page,
-                        "plain HTTP on this machine, \"127.0.0.1:PORT\" (default: port 8091, "
-                        "without --remote)");
-    command->add_option("--remote", options->remote,
-                        "\"ADDRESS:PORT\": TLS with certificates on both sides, as server.remote");
-    command->add_option("--certificate", options->certificate,
-                        "of --remote, PEM (default: of --config)");
-    command->add_option("--key", options->key, "of the certificate, PEM (default: of --config)");
-    command->add_option("--clients-ca", options->clients_ca,
-                        "authority of the clients' certificates, PEM (default: of --config)");
-    command->add_option("--revoked", options->revoked,
-                        "certificates that no longer count, PEM (default: of --config)");
-    add_archive_options(*command, where);
-    command->footer(
+void add_archive_serve(CLI::App& group, int& exit_code) {
+    const auto [command, options] = add_command<ServeOptions>(
+        group, exit_code, "serve", "Shows an archive in a browser; nothing can be changed there",
+        serve_archive);
+    command.add_option("--page", options.page,
+                       "plain HTTP on this machine, \"127.0.0.1:PORT\" (default: port 8091, "
+                       "without --remote)");
+    command.add_option("--remote", options.remote,
+                       "\"ADDRESS:PORT\": TLS with certificates on both sides, as server.remote");
+    command.add_option("--certificate", options.certificate,
+                       "of --remote, PEM (default: of --config)");
+    command.add_option("--key", options.key, "of the certificate, PEM (default: of --config)");
+    command.add_option("--clients-ca", options.clients_ca,
+                       "authority of the clients' certificates, PEM (default: of --config)");
+    command.add_option("--revoked", options.revoked,
+                       "certificates that no longer count, PEM (default: of --config)");
+    add_archive_options(command, options.where);
+    command.footer(
         "Example: vibrig archive serve --archive /lab/archive\n"
         "Ends with SIGINT or SIGTERM.\n"
         "Exit codes: 0 ended by a signal, 2 bad usage or input.");
-    command->callback([options, where, &exit_code] {
-        exit_code = guarded([&] { return serve_archive(*options, *where); });
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,16 +1,12 @@
 // vibrig archive type: what the units of a type have in common.
-#include "daemon/tool/recordings/archive_type.hpp"
-
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
 
 #include "daemon/archive/type_statistics.hpp"
 #include "daemon/plan/type_prior.hpp"
-#include "daemon/results/exit_status.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/text.hpp"
 
@@ -21,6 +17,7 @@ namespace {
 struct TypeOptions {
     std::string type, without;
     bool simulated = false, json = false;
+    ArchiveOptions where = {};
 };
 
 void print(const plan::TypePrior& prior) {
@@ -38,8 +35,8 @@ void print(const plan::TypePrior& prior) {
     std::fflush(stdout);
 }
 
-int type_statistics(const TypeOptions& o, const ArchiveOptions& where) {
-    const auto index = open_index(where);
+int type_statistics(const TypeOptions& o) {
+    const auto index = open_index(o.where);
     const auto found = archive::campaigns_of_type(*index, o.type, o.without, o.simulated);
     if (found.units.size() < estimator::uncertainty::kFewestUnits) {
         std::cerr << index->name() << ": found " << found.units.size() << " units of type '"
@@ -61,27 +58,23 @@ int type_statistics(const TypeOptions& o, const ArchiveOptions& where) {
 
 }  // namespace
 
-void add_archive_type(CLI::App& group, const std::shared_ptr<ArchiveOptions>& where,
-                      int& exit_code) {
-    auto options = std::make_shared<TypeOptions>();
-    CLI::App* command = group.add_subcommand(
-        "type", "What the units of a type have in common, and by how much they differ");
-    command->add_option("TYPE", options->type, "as unit.type says it")->required();
-    command->add_option("--without", options->without,
-                        "leave out the unit with this serial number, of which something is to be "
-                        "foretold");
-    command->add_flag("--simulated", options->simulated,
-                      "of campaigns on simulated rigs (default: on real ones)");
-    command->add_flag("--json", options->json, "print it as JSON, with covariances");
-    add_archive_options(*command, where);
-    command->footer(
+void add_archive_type(CLI::App& group, int& exit_code) {
+    const auto [command, options] = add_command<TypeOptions>(
+        group, exit_code, "type",
+        "What the units of a type have in common, and by how much they differ", type_statistics);
+    command.add_option("TYPE", options.type, "as unit.type says it")->required();
+    command.add_option("--without", options.without,
+                       "leave out the unit with this serial number, of which something is to be "
+                       "foretold");
+    command.add_flag("--simulated", options.simulated,
+                     "of campaigns on simulated rigs (default: on real ones)");
+    command.add_flag("--json", options.json, "print it as JSON, with covariances");
+    add_archive_options(command, options.where);
+    command.footer(
         "Example: vibrig archive type GP-3 --archive /lab/archive\n"
         "Each unit counts once, however many campaigns it has. `of another unit`: the standard\n"
         "deviation by which a unit that is not among them is expected to differ from the mean.\n"
         "Exit codes: 0, 1 fewer than 10 units, 2 bad usage or input.");
-    command->callback([options, where, &exit_code] {
-        exit_code = guarded([&] { return type_statistics(*options, *where); });
-    });
 }
 
 }  // namespace vibrig::tool

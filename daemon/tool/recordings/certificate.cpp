@@ -1,9 +1,6 @@
 // vibrig certificate.
 #include <toml++/toml.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -11,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -246,28 +242,26 @@ int certify(const CertificateArguments& arguments) {
 }  // namespace
 
 void add_certificate(CLI::App& app, int& exit_code) {
-    auto arguments = std::make_shared<CertificateArguments>();
-    CLI::App* command = app.add_subcommand(
-        "certificate", "Calibration certificate for a customer: HTML, PDF, JSON");
-    command->add_option("CAMPAIGN", arguments->campaign, kCampaignHelp)->required();
+    const auto [command, arguments] = add_command<CertificateArguments>(
+        app, exit_code, "certificate", "Calibration certificate for a customer: HTML, PDF, JSON",
+        certify);
+    command.add_option("CAMPAIGN", arguments.campaign, kCampaignHelp)->required();
     command
-        ->add_option("--paper", arguments->paper,
-                     "TOML: number, [laboratory], [customer], [item], [[limit]]")
+        .add_option("--paper", arguments.paper,
+                    "TOML: number, [laboratory], [customer], [item], [[limit]]")
         ->required();
-    command->add_option("--by", arguments->by, "named person who issues it")->required();
-    command->add_option("-o,--output", arguments->output,
-                        "files to write, without .html, .pdf, .json (default certificate)");
-    add_socket(*command, arguments->at);
-    command->add_flag("--no-journal", arguments->no_journal,
-                      "do not enter number and hashes in the rig's journal");
-    command->footer(
+    command.add_option("--by", arguments.by, "named person who issues it")->required();
+    command.add_option("-o,--output", arguments.output,
+                       "files to write, without .html, .pdf, .json (default certificate)");
+    add_socket(command, arguments.at);
+    command.add_flag("--no-journal", arguments.no_journal,
+                     "do not enter number and hashes in the rig's journal");
+    command.footer(
         "Example: vibrig certificate demo-20260301T080000Z --paper C-17.toml --by \"A. Person\"\n"
         "A result that is not valid is refused, a doubtful one marked. The SHA-256 of PDF and "
         "JSON go\ninto the signed journal of the rig's daemon (--socket or --host), each number "
         "once.\n"
         "Exit codes: 0 issued, 1 refused, 2 bad usage or input.");
-    command->callback(
-        [arguments, &exit_code] { exit_code = guarded([&] { return certify(*arguments); }); });
 }
 
 }  // namespace vibrig::tool

@@ -1,10 +1,8 @@
 #include "daemon/tool/recordings/identified.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <iterator>
@@ -21,6 +19,7 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/spectrum_result.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/analysis/rig_doubts.hpp"
 #include "daemon/tool/analysis/seen_plan.hpp"
@@ -38,12 +37,6 @@ namespace vibrig::tool {
 namespace {
 
 using proto::RecordingRow;
-
-std::string plain_number(double value) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%g", value);
-    return text.data();
-}
 
 /// A result, and what of the recording contradicts the configuration.
 struct Found {
@@ -261,13 +254,12 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
         if (!kind.profile.empty()) continue;
         const double hz = kind.hz(), window_s = settings.level_window_s;
         if (!spectrum::forbidden(hz, 1 / period_s, window_s)) continue;
-        std::array<char, 240> text{};
-        std::snprintf(text.data(), text.size(),
-                      ": %s: found %g Hz at %g samples/s, of which a harmonic "
-                      "falls on a multiple of the rate, expected another: the nearest is %g Hz",
-                      spectra ? "--spectra" : "column frequency_hz", hz, 1 / period_s,
-                      spectrum::nearest_free(hz, 1 / period_s, window_s));
-        throw std::runtime_error(file + text.data());
+        throw std::runtime_error(
+            file +
+            printed(": %s: found %g Hz at %g samples/s, of which a harmonic falls on a multiple of "
+                    "the rate, expected another: the nearest is %g Hz",
+                    spectra ? "--spectra" : "column frequency_hz", hz, 1 / period_s,
+                    spectrum::nearest_free(hz, 1 / period_s, window_s)));
     }
 }
 
@@ -278,13 +270,11 @@ void refuse_unseen(const DwellKinds& kinds, const estimator::Settings& settings,
         const double share =
             estimator::spectrum::seen_of(settings.accelerometer_response, kind.bands).share;
         if (share >= estimator::kLeastSeen) continue;
-        std::array<char, 240> text{};
         const std::string name = kind.profile.empty() ? "" : "profile '" + kind.profile + "' ";
-        std::snprintf(text.data(), text.size(),
-                      ": found %.120sabout %g Hz, of which the accelerometers see %.3g of the "
-                      "power, expected half of it at least",
-                      name.c_str(), kind.hz(), share);
-        throw std::runtime_error(file + text.data());
+        throw std::runtime_error(
+            file + printed(": found %.120sabout %g Hz, of which the accelerometers see %.3g of the "
+                           "power, expected half of it at least",
+                           name.c_str(), kind.hz(), share));
     }
 }
 
@@ -348,9 +338,8 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
             if (!shook && kind)
                 throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
                                          ": found a dwell in which nothing vibrates, expected " +
-                                         (random
-                                              ? "profile '" + kinds.kinds()[*kind].profile + "'"
-                                              : plain_number(kinds.kinds()[*kind].hz()) + " Hz") +
+                                         (random ? "profile '" + kinds.kinds()[*kind].profile + "'"
+                                                 : printed("%g Hz", kinds.kinds()[*kind].hz())) +
                                          ", with which it is said to have shaken");
             if (row.held_out)
                 found.kept_out.push_back(

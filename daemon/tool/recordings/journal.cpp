@@ -1,10 +1,6 @@
 // vibrig journal verify: whether a journal is what was written into it.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -131,24 +127,21 @@ void add_journal(CLI::App& app, int& exit_code) {
     CLI::App& journal = *app.add_subcommand("journal", "What the daemon has written down");
     journal.require_subcommand(1);
     journal.footer("Example: vibrig journal verify");
-    CLI::App& verifying =
-        *journal.add_subcommand("verify", "Whether a journal is what was written into it");
-    auto options = std::make_shared<JournalOptions>();
+    const auto [verifying, options] = add_command<JournalOptions>(
+        journal, exit_code, "verify", "Whether a journal is what was written into it", verify,
+        kWhoVerifies);
     verifying
-        .add_option("FILE", options->file, "The journal; its signed head (.head) lies beside it")
+        .add_option("FILE", options.file, "The journal; its signed head (.head) lies beside it")
         ->capture_default_str();
-    verifying.add_option("--anchor", options->anchors,
+    verifying.add_option("--anchor", options.anchors,
                          "A head that it has to go through: a recording, a report, a file or "
                          "the line itself; again for more");
-    verifying.add_option("--key", options->key,
+    verifying.add_option("--key", options.key,
                          "The public key, or its fingerprint, that has to have signed it");
-    verifying.add_flag("--json", options->json, "As JSON");
+    verifying.add_flag("--json", options.json, "As JSON");
     verifying.footer(
         "Example: vibrig journal verify /var/lib/vibrig/journal.sqlite3 --anchor report.html\n"
         "Exit codes: 0 it is whole, 1 something is missing or changed, 2 it cannot be read.");
-    verifying.callback([options, &exit_code] {
-        exit_code = guarded([&] { return verify(*options); }, kWhoVerifies);
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,7 +1,4 @@
 // vibrig list: which campaigns there are.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
@@ -22,6 +19,7 @@ struct ListOptions {
     std::string serial, type, rig, since, until, verdict, name;
     std::size_t newest = 0;
     bool superseded = false, json = false;
+    ArchiveOptions where = {};
 };
 
 Json entry_json(const archive::Entry& one) {
@@ -74,7 +72,7 @@ void print_table(const std::vector<archive::Entry>& found) {
     std::fflush(stdout);
 }
 
-int list(const ListOptions& o, const ArchiveOptions& where) {
+int list(const ListOptions& o) {
     archive::Filter filter;
     filter.serial = o.serial;
     filter.type = o.type;
@@ -85,7 +83,7 @@ int list(const ListOptions& o, const ArchiveOptions& where) {
     filter.superseded = o.superseded;
     if (!o.since.empty()) filter.since_utc_ns = utc_of("--since", o.since);
     if (!o.until.empty()) filter.until_utc_ns = utc_of("--until", o.until);
-    const auto found = open_index(where)->campaigns(filter);
+    const auto found = open_index(o.where)->campaigns(filter);
     if (o.json) {
         // One by one: of ten thousand a whole document would be slow.
         std::string text = "{\"campaigns\":[";
@@ -104,30 +102,26 @@ int list(const ListOptions& o, const ArchiveOptions& where) {
 }  // namespace
 
 void add_list(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<ListOptions>();
-    auto where = std::make_shared<ArchiveOptions>();
-    CLI::App* command = app.add_subcommand("list", "Campaigns of an archive or a rig, by time");
-    command->add_option("--serial", options->serial, "of this unit");
-    command->add_option("--type", options->type, "of this type of unit");
-    command->add_option("--rig", options->rig, "of this rig");
-    command->add_option("--name", options->name, "of this name");
-    command->add_option("--since", options->since, "begun on this day or later, UTC: 2026-03-01");
-    command->add_option("--until", options->until, "begun before this day, UTC");
-    command->add_option("--verdict", options->verdict, "with this verdict")
+    const auto [command, options] = add_command<ListOptions>(
+        app, exit_code, "list", "Campaigns of an archive or a rig, by time", list);
+    command.add_option("--serial", options.serial, "of this unit");
+    command.add_option("--type", options.type, "of this type of unit");
+    command.add_option("--rig", options.rig, "of this rig");
+    command.add_option("--name", options.name, "of this name");
+    command.add_option("--since", options.since, "begun on this day or later, UTC: 2026-03-01");
+    command.add_option("--until", options.until, "begun before this day, UTC");
+    command.add_option("--verdict", options.verdict, "with this verdict")
         ->check(CLI::IsMember({"valid", "doubtful", "not valid", "not-valid"}));
-    command->add_option("--newest", options->newest, "at most so many, the newest")
+    command.add_option("--newest", options.newest, "at most so many, the newest")
         ->check(CLI::Range(1, 1'000'000'000));
-    command->add_flag("--superseded", options->superseded,
-                      "also what was delivered before the campaign went on");
-    command->add_flag("--json", options->json, "print them as JSON");
-    add_archive_options(*command, where);
-    command->footer(
+    command.add_flag("--superseded", options.superseded,
+                     "also what was delivered before the campaign went on");
+    command.add_flag("--json", options.json, "print them as JSON");
+    add_archive_options(command, options.where);
+    command.footer(
         "Example: vibrig list --serial 0017 --since 2026-01-01 --archive /lab/archive\n"
         "In a rig's folder of recordings it reads, once, what the recorder noted.\n"
         "Exit codes: 0, 2 bad usage or input.");
-    command->callback([options, where, &exit_code] {
-        exit_code = guarded([&] { return list(*options, *where); });
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,14 +1,10 @@
 // vibrig export and vibrig recover.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -17,8 +13,8 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/report/report.hpp"
-#include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/export_csv.hpp"
@@ -149,7 +145,13 @@ bool export_candump(const record::Campaign& campaign, const std::string& path, b
     return tell_missing_raw(campaign.folder);
 }
 
-int export_campaign(const std::string& argument, const std::string& format, std::string path) {
+struct ExportOptions {
+    std::string campaign, format, output;
+};
+
+int export_campaign(const ExportOptions& options) {
+    const std::string &argument = options.campaign, &format = options.format;
+    std::string path = options.output;
     record::Campaign campaign;
     {
         Progress progress("reading " + argument);
@@ -207,19 +209,14 @@ nlohmann::ordered_json recovery_json(const record::Recovery& found) {
 }
 
 std::string recovery_text(const record::Recovery& found) {
-    std::array<char, 200> line{};
     std::string text = !found.was_closed ? "mended\n"
                        : found.recovered ? "mended before: nothing to mend\n"
                                          : "closed in order: nothing to mend\n";
-    std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done, %zu %s\n",
-                  found.samples, found.recorded_s, found.dwells, found.parts,
-                  found.parts == 1 ? "file" : "files");
-    text += line.data();
+    text += line("%zu samples over %.3f s, %zu dwells done, %zu %s", found.samples,
+                 found.recorded_s, found.dwells, found.parts, found.parts == 1 ? "file" : "files");
     if (found.recovered) {
-        std::snprintf(line.data(), line.size(),
-                      "%zu samples more from the raw log, which goes on %.3f s longer\n",
-                      found.samples_from_raw, found.raw_until_s);
-        text += line.data();
+        text += line("%zu samples more from the raw log, which goes on %.3f s longer",
+                     found.samples_from_raw, found.raw_until_s);
         if (found.cut_dwell.empty()) text += "no dwell was in progress\n";
     }
     for (const auto& words : lost(found)) text += "lost: " + words + "\n";
@@ -227,13 +224,19 @@ std::string recovery_text(const record::Recovery& found) {
     return text;
 }
 
-int recover(const std::string& argument, bool json) {
-    const auto found = record::recover(
-        named_campaign(argument), [](const std::string& words) { std::cerr << words << '\n'; });
+struct RecoverOptions {
+    std::string campaign;
+    bool json = false;
+};
+
+int recover(const RecoverOptions& options) {
+    const auto found =
+        record::recover(named_campaign(options.campaign),
+                        [](const std::string& words) { std::cerr << words << '\n'; });
     int code = 0;
     for (const auto& campaign : found) {
         if (!campaign.missing_raw.empty() || !campaign.failed.empty()) code = kNo;
-        if (json) {
+        if (options.json) {
             std::cout << recovery_json(campaign).dump() << '\n';
         } else if (campaign.failed.empty()) {
             if (found.size() > 1) std::cout << campaign.path << ": ";
@@ -249,52 +252,42 @@ int recover(const std::string& argument, bool json) {
 }  // namespace
 
 void add_recordings(CLI::App& app, int& exit_code) {
-    struct Options {
-        std::string campaign, format, output;
-        bool json = false;
-    };
-    auto options = std::make_shared<Options>();
-    CLI::App* exporting = app.add_subcommand("export", "A recorded campaign for other programs");
-    exporting->add_option("CAMPAIGN", options->campaign, kCampaignHelp)->required();
+    const auto [exporting, options] = add_command<ExportOptions>(
+        app, exit_code, "export", "A recorded campaign for other programs", export_campaign);
+    exporting.add_option("CAMPAIGN", options.campaign, kCampaignHelp)->required();
     exporting
-        ->add_option(
-            "--to", options->format,
+        .add_option(
+            "--to", options.format,
             "csv (as `vibrig identify` reads it: samples of good quality, zeros that were taken "
             "in place subtracted), mat (MATLAB, Octave), candump (both directions; "
             "canplayer, log2asc) or wireshark (the same without directions)")
         ->required()
         ->check(CLI::IsMember({"csv", "mat", "candump", "wireshark"}));
-    exporting->add_option("-o,--output", options->output,
-                          "file to write (default: the campaign's name here; candump: - is "
-                          "standard output)");
-    exporting->footer(
+    exporting.add_option("-o,--output", options.output,
+                         "file to write (default: the campaign's name here; candump: - is "
+                         "standard output)");
+    exporting.footer(
         "Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv\n"
         "A sample takes 79 bytes in the recording's HDF5 file (93 with estimates and covariances), "
         "59 as\n"
         "frames in its compressed raw log (470 as text).\n"
         "Exit codes: 0, 1 a segment of the raw log is missing (candump, wireshark), 2 bad usage or "
         "input.");
-    exporting->callback([options, &exit_code] {
-        exit_code = guarded(
-            [&] { return export_campaign(options->campaign, options->format, options->output); });
-    });
 
-    CLI::App* recovering = app.add_subcommand(
-        "recover", "Mends a campaign's files after a crash and says what was lost");
+    const auto [recovering, to_recover] = add_command<RecoverOptions>(
+        app, exit_code, "recover", "Mends a campaign's files after a crash and says what was lost",
+        recover);
     recovering
-        ->add_option("CAMPAIGN", options->campaign,
-                     std::string(kCampaignHelp) +
-                         "; or the folder of all recordings: then its index is made anew, too")
+        .add_option("CAMPAIGN", to_recover.campaign,
+                    std::string(kCampaignHelp) +
+                        "; or the folder of all recordings: then its index is made anew, too")
         ->required();
-    recovering->add_flag("--json", options->json, "print what was found as JSON");
-    recovering->footer(
+    recovering.add_flag("--json", to_recover.json, "print what was found as JSON");
+    recovering.footer(
         "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
         "A file that was closed in order is left as it is.\n"
         "Exit codes: 0, 1 a segment of the raw log is missing or one of several campaigns cannot "
         "be\nrecovered, 2 bad usage or input.");
-    recovering->callback([options, &exit_code] {
-        exit_code = guarded([&] { return recover(options->campaign, options->json); });
-    });
 }
 
 }  // namespace vibrig::tool

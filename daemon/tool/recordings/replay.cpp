@@ -1,12 +1,6 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -20,6 +14,7 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_json.hpp"
 #include "daemon/results/result_table.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/simulated.hpp"
@@ -158,12 +153,10 @@ int replay(const ReplayArguments& arguments) {
                       ? replayed_json(replayed, assessed, settings, simulated, same_build) + "\n"
                       : simulated_line(simulated) + result_table(replayed.result, assessed))
               << std::flush;
-    std::array<char, 160> text{};
-    std::snprintf(text.data(), text.size(),
-                  "%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
-                  replayed.samples, replayed.dwells.size(), replayed.recorded_s, replayed.took_s,
-                  replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
-    std::cerr << text.data() << '\n';
+    std::cerr << line("%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
+                      replayed.samples, replayed.dwells.size(), replayed.recorded_s,
+                      replayed.took_s,
+                      replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
     if (replayed.compared > 0) {
         if (replayed.different == 0) {
             std::cerr << "estimates after each of " << replayed.compared
@@ -186,30 +179,30 @@ int replay(const ReplayArguments& arguments) {
 }  // namespace
 
 void add_replay(CLI::App& app, int& exit_code) {
-    auto arguments = std::make_shared<ReplayArguments>();
-    CLI::App* command = app.add_subcommand(
-        "replay", "A recording through the daemon's own path, on a virtual clock");
+    const auto [command, arguments] = add_command<ReplayArguments>(
+        app, exit_code, "replay", "A recording through the daemon's own path, on a virtual clock",
+        replay);
     command
-        ->add_option("FILE", arguments->files,
-                     "a campaign: its folder, HDF5 file or name in the index; or candump logs in "
-                     "order (.log, .log.zst)")
+        .add_option("FILE", arguments.files,
+                    "a campaign: its folder, HDF5 file or name in the index; or candump logs in "
+                    "order (.log, .log.zst)")
         ->required();
-    command->add_option("--speed", arguments->speed, "times the recording's own, or max (default)");
-    command->add_option("--config", arguments->config,
-                        "identify anew with these settings (TOML) instead of the recorded ones");
-    command->add_option("--dwells", arguments->dwells,
-                        "with candump logs: which times are which dwell (default: dwells.csv "
-                        "beside the first log)");
+    command.add_option("--speed", arguments.speed, "times the recording's own, or max (default)");
+    command.add_option("--config", arguments.config,
+                       "identify anew with these settings (TOML) instead of the recorded ones");
+    command.add_option("--dwells", arguments.dwells,
+                       "with candump logs: which times are which dwell (default: dwells.csv "
+                       "beside the first log)");
     command
-        ->add_option("--instruction-set", arguments->instruction_set,
-                     "of the filter: auto (the best), or one of this processor's")
+        .add_option("--instruction-set", arguments.instruction_set,
+                    "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
-    command->add_option("--plot", arguments->plot,
-                        "an SVG file: uncertainties of the coefficients; or a folder: their "
-                        "correlation and the dwells' residuals, too");
-    command->add_flag("--json", arguments->json, "print the result as JSON");
-    command->add_flag("--strict", arguments->strict, "a doubtful result is a no as well");
-    command->footer(
+    command.add_option("--plot", arguments.plot,
+                       "an SVG file: uncertainties of the coefficients; or a folder: their "
+                       "correlation and the dwells' residuals, too");
+    command.add_flag("--json", arguments.json, "print the result as JSON");
+    command.add_flag("--strict", arguments.strict, "a doubtful result is a no as well");
+    command.footer(
         "Example: vibrig replay /var/lib/vibrig/platform-17-20260301T080000Z --speed max\n"
         "On the build and instruction set of the recording the estimates come out as they were to\n"
         "the last bit; standard error says whether they did. 28 dwells of 100 s at 40 samples/s "
@@ -220,8 +213,6 @@ void add_replay(CLI::App& app, int& exit_code) {
         "build and instruction "
         "set give other estimates (then "
         "\"replay\" in\nthe JSON), 2 bad usage or input.");
-    command->callback(
-        [arguments, &exit_code] { exit_code = guarded([&] { return replay(*arguments); }); });
 }
 
 }  // namespace vibrig::tool

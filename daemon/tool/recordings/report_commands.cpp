@@ -1,15 +1,10 @@
 // vibrig report and vibrig compensate.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -23,6 +18,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_table.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
@@ -48,14 +44,8 @@ struct ReportArguments {
 struct CompensateArguments {
     std::string campaign, format = "text", output, config;
     std::optional<std::string> platform_g, table_g;  ///< as given
-    std::vector<double> attitude;
+    std::vector<double> attitude{0, 0, 0};
 };
-
-std::string filled_in(const char* format, auto... values) {
-    std::array<char, 256> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
-}
 
 estimator::Settings report_settings(const record::Campaign& campaign, const std::string& config) {
     return config.empty() ? report::settings_of(campaign)
@@ -85,11 +75,7 @@ void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
         (moved.empty() ? "" : " What is marked has moved by more than they allow, at 1 in 1000.");
     analysis.history = {
         {"coefficient", "now", "mean before", "95 %", "shutdown instability", "unit"}};
-    const auto number = [](double value) {
-        std::array<char, 32> text{};
-        std::snprintf(text.data(), text.size(), "%.5f", value);
-        return std::string(text.data());
-    };
+    const auto number = [](double value) { return printed("%.5f", value); };
     for (const auto& of : trend.coefficients) {
         const auto& c = now.coefficients[of.position];
         const bool far = std::ranges::any_of(
@@ -183,8 +169,8 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
     for (std::size_t g = 0; g < 3; ++g) {
         Json axes = Json::array();
         for (const auto& axis : settings.gyro_axes[g])
-            axes.push_back(filled_in("%c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]));
-        root["axes"][filled_in("gyro_%c", "xyz"[g])] = std::move(axes);
+            axes.push_back(printed("%c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]));
+        root["axes"][printed("gyro_%c", "xyz"[g])] = std::move(axes);
     }
     root["drift_sign"] = settings.drift_sign;
     root["prediction"] = prediction;
@@ -194,11 +180,11 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
 std::string axes_line(const estimator::Settings& settings) {
     std::string text = "input, output, spin axis (I, O, S) in platform axes:";
     for (std::size_t g = 0; g < 3; ++g) {
-        text += filled_in("%s gyro %c", g == 0 ? "" : ",", "xyz"[g]);
+        text += printed("%s gyro %c", g == 0 ? "" : ",", "xyz"[g]);
         for (const auto& axis : settings.gyro_axes[g])
-            text += filled_in(" %c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]);
+            text += printed(" %c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]);
     }
-    return text + filled_in("; drift sign %+d", settings.drift_sign);
+    return text + printed("; drift sign %+d", settings.drift_sign);
 }
 
 /// For comments: what the numbers refer to, and what they predict.
@@ -207,14 +193,14 @@ std::vector<std::string> comment_lines(const estimator::Settings& settings,
                                        const CompensateArguments& arguments, double kappa) {
     std::vector<std::string> lines{
         axes_line(settings),
-        filled_in("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
-                  arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
-                  std::sqrt(2 * (kappa - 1)))};
+        printed("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
+                arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                std::sqrt(2 * (kappa - 1)))};
     for (std::size_t k = 0; k < 3; ++k)
         lines.push_back(
-            filled_in("gyro %c: drift %.6f, left after compensation 0 +- %.6f (1 sigma)%s",
-                      "xyz"[k], predicted.drift_dph[k], predicted.residual_dph[k],
-                      predicted.determined[k] ? "" : ", rests on what is not determined"));
+            printed("gyro %c: drift %.6f, left after compensation 0 +- %.6f (1 sigma)%s", "xyz"[k],
+                    predicted.drift_dph[k], predicted.residual_dph[k],
+                    predicted.determined[k] ? "" : ", rests on what is not determined"));
     return lines;
 }
 
@@ -225,8 +211,8 @@ std::string coefficients_csv(const report::Coefficients& c,
     text += "name,value,sigma,unit\n";
     for (std::size_t i = 0; i < kParameters; ++i) {
         text += estimator::parameter_names()[i];
-        text += c.observable[i] ? filled_in(",%.17g,%.17g,", c.value[i], c.sigma[i])
-                                : std::string(",,,");
+        text +=
+            c.observable[i] ? printed(",%.17g,%.17g,", c.value[i], c.sigma[i]) : std::string(",,,");
         text += std::string(estimator::parameter_unit(i)) + "\n";
     }
     return text;
@@ -254,8 +240,8 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
         for (std::size_t g = 0; g < 3; ++g) {
             text += "    {";
             for (std::size_t k = 0; k < 10; ++k)
-                text += filled_in("%s%.17g", k == 0 ? "" : ", ",
-                                  sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
+                text += printed("%s%.17g", k == 0 ? "" : ", ",
+                                sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
             text += g == 2 ? "} /* z */\n" : g == 1 ? "}, /* y */\n" : "}, /* x */\n";
         }
         text += "};\n";
@@ -266,23 +252,23 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
 std::string coefficients_text(const report::Coefficients& c, const std::string& axes,
                               const report::Prediction& predicted,
                               const CompensateArguments& arguments, double kappa) {
-    std::string text = filled_in("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
+    std::string text = printed("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
     for (std::size_t i = 0; i < kParameters; ++i) {
         text += c.observable[i]
-                    ? filled_in("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
-                                c.value[i], c.sigma[i], estimator::parameter_unit(i))
-                    : filled_in("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
-                                "not determined", "-", estimator::parameter_unit(i));
+                    ? printed("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
+                              c.value[i], c.sigma[i], estimator::parameter_unit(i))
+                    : printed("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
+                              "not determined", "-", estimator::parameter_unit(i));
     }
     text += "\n" + axes + "\n";
-    text += filled_in("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
-                      arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
-                      std::sqrt(2 * (kappa - 1)));
-    text += filled_in("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
+    text += printed("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
+                    arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                    std::sqrt(2 * (kappa - 1)));
+    text += printed("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
     for (std::size_t k = 0; k < 3; ++k)
-        text += filled_in("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
-                          predicted.drift_dph[k], predicted.residual_dph[k],
-                          predicted.determined[k] ? "" : "  rests on what is not determined");
+        text += printed("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
+                        predicted.drift_dph[k], predicted.residual_dph[k],
+                        predicted.determined[k] ? "" : "  rests on what is not determined");
     return text;
 }
 
@@ -300,19 +286,18 @@ void check_finite(const std::string& path, const report::Coefficients& c) {
         for (const double number : {c.value[i], c.sigma[i]}) {
             if (c.observable[i] && !std::isfinite(number))
                 throw std::runtime_error(path + ": " + estimator::parameter_names()[i] +
-                                         ": found " + filled_in("%g", number) +
+                                         ": found " + printed("%g", number) +
                                          ", expected a finite number");
         }
     }
 }
 
-int compensate(CompensateArguments arguments) {
+int compensate(const CompensateArguments& arguments) {
     if (arguments.platform_g && arguments.table_g)
         throw std::runtime_error("--table-g: found it beside --platform-g, expected one of them");
-    if (arguments.attitude.empty()) arguments.attitude = {0, 0, 0};
     for (const double angle : arguments.attitude) {
         if (!std::isfinite(angle) || std::abs(angle) > 360)
-            throw std::runtime_error("--attitude: found " + filled_in("%g", angle) +
+            throw std::runtime_error("--attitude: found " + printed("%g", angle) +
                                      ", expected -360 to 360 deg");
     }
     double level = 0;
@@ -363,63 +348,57 @@ int compensate(CompensateArguments arguments) {
 }  // namespace
 
 void add_reports(CLI::App& app, int& exit_code) {
-    auto report = std::make_shared<ReportArguments>();
-    CLI::App* reporting =
-        app.add_subcommand("report", "One page of a recorded campaign, to be signed and filed");
-    reporting->add_option("CAMPAIGN", report->campaign, kCampaignHelp)->required();
-    reporting->add_option("-o,--output", report->output,
-                          "HTML file to write (default report.html)");
-    reporting->add_option("--compare", report->compare,
-                          "an earlier campaign of the same unit: repeatability and E_n");
+    const auto [reporting, report] = add_command<ReportArguments>(
+        app, exit_code, "report", "One page of a recorded campaign, to be signed and filed",
+        make_report);
+    reporting.add_option("CAMPAIGN", report.campaign, kCampaignHelp)->required();
+    reporting.add_option("-o,--output", report.output, "HTML file to write (default report.html)");
+    reporting.add_option("--compare", report.compare,
+                         "an earlier campaign of the same unit: repeatability and E_n");
     reporting
-        ->add_flag("--same-unit", report->same_unit,
-                   "compare though a campaign states no serial number")
+        .add_flag("--same-unit", report.same_unit,
+                  "compare though a campaign states no serial number")
         ->needs("--compare");
-    reporting->add_option("--config", report->config,
-                          "identify anew with these settings instead of the recorded ones");
-    reporting->add_option("--journal", report->journal,
-                          "the daemon's journal, to be verified (default: journal.sqlite3 beside "
-                          "the campaign's folder)");
-    reporting->add_option("--archive", report->archive.archive,
-                          "show the unit's earlier campaigns in this archive (default: "
-                          "$VIBRIG_ARCHIVE)");
-    reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
-    reporting->add_flag("--strict", report->strict, "a doubtful result is a no as well");
-    reporting->footer(
+    reporting.add_option("--config", report.config,
+                         "identify anew with these settings instead of the recorded ones");
+    reporting.add_option("--journal", report.journal,
+                         "the daemon's journal, to be verified (default: journal.sqlite3 beside "
+                         "the campaign's folder)");
+    reporting.add_option("--archive", report.archive.archive,
+                         "show the unit's earlier campaigns in this archive (default: "
+                         "$VIBRIG_ARCHIVE)");
+    reporting.add_option("--pdf", report.pdf, "print it to this PDF file, too (with chromium)");
+    reporting.add_flag("--strict", report.strict, "a doubtful result is a no as well");
+    reporting.footer(
         "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
         "doubtful), 2 bad\nusage or input.\n"
         "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
-    reporting->callback(
-        [report, &exit_code] { exit_code = guarded([&] { return make_report(*report); }); });
 
-    auto compensation = std::make_shared<CompensateArguments>();
-    CLI::App* compensating = app.add_subcommand(
-        "compensate", "Coefficients for a navigation computer, and what drift they leave");
-    compensating->add_option("CAMPAIGN", compensation->campaign, kCampaignHelp)->required();
+    const auto [compensating, compensation] = add_command<CompensateArguments>(
+        app, exit_code, "compensate",
+        "Coefficients for a navigation computer, and what drift they leave", compensate);
+    compensating.add_option("CAMPAIGN", compensation.campaign, kCampaignHelp)->required();
     compensating
-        ->add_option("--to", compensation->format, "text (default), json, csv or c (a header)")
+        .add_option("--to", compensation.format, "text (default), json, csv or c (a header)")
         ->check(CLI::IsMember({"text", "json", "csv", "c"}));
-    compensating->add_flag_callback(
-        "--json", [compensation] { compensation->format = "json"; }, "as --to json");
-    compensating->add_option("-o,--output", compensation->output,
-                             "file to write (default: standard output)");
+    compensating.add_flag_callback(
+        "--json", [&format = compensation.format] { format = "json"; }, "as --to json");
+    compensating.add_option("-o,--output", compensation.output,
+                            "file to write (default: standard output)");
     compensating
-        ->add_option("--attitude", compensation->attitude,
-                     "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
+        .add_option("--attitude", compensation.attitude,
+                    "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
         ->delimiter(',')
         ->expected(3);
     // As text: CLI11 takes an empty one for 0.
-    compensating->add_option("--platform-g", compensation->platform_g,
-                             "vibration, peak at the platform, g (default 0)");
-    compensating->add_option("--table-g", compensation->table_g, "or peak at the table, g");
-    compensating->add_option("--config", compensation->config,
-                             "identify anew with these settings instead of the recorded ones");
-    compensating->footer(
+    compensating.add_option("--platform-g", compensation.platform_g,
+                            "vibration, peak at the platform, g (default 0)");
+    compensating.add_option("--table-g", compensation.table_g, "or peak at the table, g");
+    compensating.add_option("--config", compensation.config,
+                            "identify anew with these settings instead of the recorded ones");
+    compensating.footer(
         "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
-    compensating->callback([compensation, &exit_code] {
-        exit_code = guarded([&] { return compensate(*compensation); });
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,7 +1,4 @@
 // vibrig trend: a unit's coefficients over its campaigns.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -24,6 +21,7 @@ struct TrendOptions {
     std::string serial, since, plot;
     double shutdown_after_h = archive::kShutdownAfterH;
     bool json = false;
+    ArchiveOptions where = {};
 };
 
 constexpr std::size_t kMostNamed = 12;
@@ -40,8 +38,8 @@ void unknown_unit(archive::Index& index, const std::string& serial) {
                     : "expected one of" + known + (count > kMostNamed ? " ..." : "")));
 }
 
-int trend(const TrendOptions& o, const ArchiveOptions& where) {
-    const auto index = open_index(where);
+int trend(const TrendOptions& o) {
+    const auto index = open_index(o.where);
     // An empty filter is none: campaigns of many units are no unit's history.
     if (o.serial.empty()) unknown_unit(*index, o.serial);
     archive::Filter filter;
@@ -66,30 +64,26 @@ int trend(const TrendOptions& o, const ArchiveOptions& where) {
 }  // namespace
 
 void add_trend(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<TrendOptions>();
-    auto where = std::make_shared<ArchiveOptions>();
-    CLI::App* command = app.add_subcommand("trend", "A unit's coefficients over its campaigns");
-    command->add_option("SERIAL", options->serial, "the unit's serial number")->required();
-    command->add_option("--since", options->since, "campaigns of this day and later, UTC");
+    const auto [command, options] = add_command<TrendOptions>(
+        app, exit_code, "trend", "A unit's coefficients over its campaigns", trend);
+    command.add_option("SERIAL", options.serial, "the unit's serial number")->required();
+    command.add_option("--since", options.since, "campaigns of this day and later, UTC");
     command
-        ->add_option("--shutdown-after", options->shutdown_after_h,
-                     "a longer pause between two campaigns counts as a shutdown, h")
+        .add_option("--shutdown-after", options.shutdown_after_h,
+                    "a longer pause between two campaigns counts as a shutdown, h")
         ->check(CLI::Range(0.0, 1e6))
         ->capture_default_str();
-    command->add_flag("--json", options->json, "print it as JSON");
-    command->add_option("--plot", options->plot,
-                        "an SVG file for all, or a folder for a chart of each coefficient");
-    add_archive_options(*command, where);
-    command->footer(
+    command.add_flag("--json", options.json, "print it as JSON");
+    command.add_option("--plot", options.plot,
+                       "an SVG file for all, or a folder for a chart of each coefficient");
+    add_archive_options(command, options.where);
+    command.footer(
         "Example: vibrig trend 0017 --archive /lab/archive --plot trend/\n"
         "Operating instability: scatter between campaigns without a shutdown, beyond what their\n"
         "uncertainty explains (F against it); shutdown instability: between turn-ons (F against "
         "the\n"
         "scatter within). Outliers: what the other campaigns allow once in 1000 such histories.\n"
         "Exit codes: 0, 2 bad usage or input.");
-    command->callback([options, where, &exit_code] {
-        exit_code = guarded([&] { return trend(*options, *where); });
-    });
 }
 
 }  // namespace vibrig::tool

@@ -1,13 +1,11 @@
 #include "daemon/tool/recordings/trend_output.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/assessment_json.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/identification.hpp"
 
@@ -31,24 +29,13 @@ Json instability_json(const archive::Instability& of) {
 
 std::string instability_text(const archive::Instability& of) {
     if (!of.tested) return "          -";
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "%9.4f %c", of.value, of.p < kSurely ? '*' : ' ');
-    return text.data();
+    return printed("%9.4f %c", of.value, of.p < kSurely ? '*' : ' ');
 }
 
 double days_of(const archive::Trend& trend, const archive::TrendPoint& point) {
     return static_cast<double>(trend.campaigns[point.campaign].started_utc_ns -
                                trend.campaigns.front().started_utc_ns) /
            kDay_ns;
-}
-
-plot::Curve level(const std::string& name, double first, double last, double y) {
-    plot::Curve curve;
-    curve.name = name;
-    curve.x = {first, last};
-    curve.y = {y, y};
-    curve.look = plot::Look::dashed;
-    return curve;
 }
 
 std::string time_axis(const archive::Trend& trend) {
@@ -110,13 +97,10 @@ Json trend_json(const std::string& serial, const archive::Trend& trend, double s
 
 std::string trend_table(const std::string& serial, const archive::Trend& trend,
                         double shutdown_after_h) {
-    std::array<char, 256> line{};
     const std::size_t turns = trend.turn.empty() ? 0 : trend.turn.back() + 1;
-    std::snprintf(
-        line.data(), line.size(),
-        "unit %s: %zu campaigns in %zu turn-ons (a pause of more than %g h is a shutdown)",
-        serial.c_str(), trend.campaigns.size(), turns, shutdown_after_h);
-    std::string text = line.data();
+    std::string text =
+        printed("unit %s: %zu campaigns in %zu turn-ons (a pause of more than %g h is a shutdown)",
+                serial.c_str(), trend.campaigns.size(), turns, shutdown_after_h);
     if (trend.left_out > 0)
         text += "; " + std::to_string(trend.left_out) + " not valid or without a result left out";
     text +=
@@ -125,79 +109,59 @@ std::string trend_table(const std::string& serial, const archive::Trend& trend,
         "    +- U\n";
     for (const auto& of : trend.coefficients) {
         const auto& newest = of.points.back();
-        std::snprintf(line.data(), line.size(),
-                      "%-7s %15.5f   %10.5f .. %-10.5f  %s  %s  %11.5f  %8.5f  %s%s\n",
-                      estimator::parameter_names()[of.position], of.mean, of.mean_low, of.mean_high,
-                      instability_text(of.operating).c_str(), instability_text(of.shutdown).c_str(),
-                      newest.of.value, newest.of.expanded, estimator::parameter_unit(of.position),
-                      newest.outlier ? "  outlier" : "");
-        text += line.data();
+        text += line("%-7s %15.5f   %10.5f .. %-10.5f  %s  %s  %11.5f  %8.5f  %s%s",
+                     estimator::parameter_names()[of.position], of.mean, of.mean_low, of.mean_high,
+                     instability_text(of.operating).c_str(), instability_text(of.shutdown).c_str(),
+                     newest.of.value, newest.of.expanded, estimator::parameter_unit(of.position),
+                     newest.outlier ? "  outlier" : "");
     }
     text += "\n* F test: p below 0.01 without the instability\n";
     for (const auto& of : trend.coefficients)
         for (const auto& point : of.points) {
             if (!point.outlier) continue;
-            std::snprintf(line.data(), line.size(),
-                          "outlier: %s of %s, %s: %.5f, t = %.1f against the others, p = %.2g\n",
-                          estimator::parameter_names()[of.position],
-                          trend.campaigns[point.campaign].key.c_str(),
-                          minute_text(trend.campaigns[point.campaign].started_utc_ns).c_str(),
-                          point.of.value, point.t, point.p);
-            text += line.data();
+            text += line("outlier: %s of %s, %s: %.5f, t = %.1f against the others, p = %.2g",
+                         estimator::parameter_names()[of.position],
+                         trend.campaigns[point.campaign].key.c_str(),
+                         minute_text(trend.campaigns[point.campaign].started_utc_ns).c_str(),
+                         point.of.value, point.t, point.p);
         }
     return text;
 }
 
 std::string trend_chart(const archive::Trend& trend, const archive::CoefficientTrend& of) {
-    plot::Chart chart;
-    const char* const name = estimator::parameter_names()[of.position];
-    chart.title = std::string(name) + " over the campaigns";
-    chart.x = plot::Axis(time_axis(trend));
-    chart.y = plot::Axis(std::string(name) + ", " + estimator::parameter_unit(of.position));
-    plot::Curve usual, outlying;
-    usual.name = "value with U";
-    usual.look = outlying.look = plot::Look::dots;
-    outlying.name = "outlier";
+    const std::string name = estimator::parameter_names()[of.position];
+    plot::Chart chart{name + " over the campaigns", plot::Axis(time_axis(trend)),
+                      plot::Axis(name + ", " + estimator::parameter_unit(of.position))};
+    plot::Curve usual{.name = "value with U", .look = plot::Look::dots};
+    plot::Curve outlying{.name = "outlier", .look = plot::Look::dots};
     for (const auto& point : of.points) {
         plot::Curve& to = point.outlier ? outlying : usual;
-        to.x.push_back(days_of(trend, point));
-        to.y.push_back(point.of.value);
-        to.low.push_back(point.of.value - point.of.expanded);
-        to.high.push_back(point.of.value + point.of.expanded);
+        to.add(days_of(trend, point), point.of.value, point.of.value - point.of.expanded,
+               point.of.value + point.of.expanded);
     }
     const double last = days_of(trend, of.points.back());
     chart.curves.push_back(usual);
     if (!outlying.x.empty()) chart.curves.push_back(outlying);
-    chart.curves.push_back(level("mean", 0, last, of.mean));
-    chart.curves.push_back(level("its 95 % interval", 0, last, of.mean_low));
-    chart.curves.push_back(level("", 0, last, of.mean_high));
+    chart.curves.push_back(plot::level_line("mean", 0, last, of.mean));
+    chart.curves.push_back(plot::level_line("its 95 % interval", 0, last, of.mean_low));
+    chart.curves.push_back(plot::level_line("", 0, last, of.mean_high));
     return chart.svg();
 }
 
 void plot_trend(const std::string& serial, const archive::Trend& trend, const std::string& path) {
-    plot::Chart chart;
-    chart.title = "unit " + serial + ": all coefficients";
-    chart.x = plot::Axis(time_axis(trend));
-    chart.y = plot::Axis("(value - mean) / u");
+    plot::Chart chart{"unit " + serial + ": all coefficients", plot::Axis(time_axis(trend)),
+                      plot::Axis("(value - mean) / u")};
     for (const auto& of : trend.coefficients) {
         plot::Curve curve;
         for (const auto& point : of.points) {
-            curve.x.push_back(days_of(trend, point));
-            curve.y.push_back((point.of.value - of.mean) / point.u);
+            curve.add(days_of(trend, point), (point.of.value - of.mean) / point.u);
         }
         chart.curves.push_back(std::move(curve));
     }
-    if (path.ends_with(".svg")) {
-        plot::write_file(path, chart.svg());
-        return;
-    }
-    plot::make_folder(path);
-    plot::write_file((std::filesystem::path(path) / "all.svg").string(), chart.svg());
+    plot::Pictures pictures{{"all", chart.svg()}};
     for (const auto& of : trend.coefficients)
-        plot::write_file((std::filesystem::path(path) /
-                          (std::string(estimator::parameter_names()[of.position]) + ".svg"))
-                             .string(),
-                         trend_chart(trend, of));
+        pictures.emplace_back(estimator::parameter_names()[of.position], trend_chart(trend, of));
+    plot::write_pictures(path, pictures);
 }
 
 }  // namespace vibrig::tool
