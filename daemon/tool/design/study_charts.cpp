@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/plot/chart.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/statistics.hpp"
 #include "daemon/tool/design/study_output.hpp"
@@ -31,13 +31,6 @@ std::string first_of(std::size_t shown, std::size_t all, const std::string& what
     return "the first " + std::to_string(shown) + " of " + std::to_string(all) + " " + what;
 }
 
-plot::Curve curve_of(const std::string& name, plot::Look look) {
-    plot::Curve curve;
-    curve.name = name;
-    curve.look = look;
-    return curve;
-}
-
 /// Places 1, 2 ... of what is counted, with room for points beside them.
 plot::Axis axis_of_places(const std::string& label, double first, double last) {
     plot::Axis axis(label);
@@ -60,30 +53,18 @@ plot::Axis axis_of_points(const Json& result) {
                           result.at("points").back().at("point").get<double>());
 }
 
-plot::Curve level_line(const std::string& name, double first, double last, double y) {
-    plot::Curve curve = curve_of(name, plot::Look::dashed);
-    curve.x = {first, last};
-    curve.y = {y, y};
-    return curve;
-}
-
 void add_interval(plot::Curve& curve, double x, const Json& interval) {
-    curve.x.push_back(x);
-    curve.y.push_back(number_at(interval, "/value"));
-    curve.low.push_back(number_at(interval, "/low"));
-    curve.high.push_back(number_at(interval, "/high"));
+    curve.add(x, number_at(interval, "/value"), number_at(interval, "/low"),
+              number_at(interval, "/high"));
 }
 
 /// Of one point: every coefficient's interval below `pointer`.
 plot::Chart coefficient_chart(const Json& point, const std::string& title, const char* y,
                               const std::vector<std::pair<const char*, const char*>>& curves) {
-    plot::Chart chart;
-    chart.title = title;
-    chart.x = axis_of_coefficients();
-    chart.y = plot::Axis(y);
+    plot::Chart chart{title, axis_of_coefficients(), plot::Axis(y)};
     double shift = -kShift;
     for (const auto& [name, pointer] : curves) {
-        plot::Curve curve = curve_of(name, plot::Look::dots);
+        plot::Curve curve{.name = name, .look = plot::Look::dots};
         double at = 1;
         for (const Json& c : point.at("coefficients")) {
             const Json::json_pointer where(pointer);
@@ -98,36 +79,30 @@ plot::Chart coefficient_chart(const Json& point, const std::string& title, const
 }
 
 plot::Chart nees_chart(const Json& point) {
-    plot::Chart chart;
-    chart.title = "NEES in 20 bins that are equally likely under chi-square 30";
-    chart.x = axis_of_places("bin", 1, study::kNeesBins);
-    chart.y = plot::Axis("campaigns");
+    plot::Chart chart{"NEES in 20 bins that are equally likely under chi-square 30",
+                      axis_of_places("bin", 1, study::kNeesBins), plot::Axis("campaigns")};
     chart.y.include(0);
     double total = 0, shift = -kShift;
     for (const auto& [claim, name] : kClaims) {
         const Json& nees = point.at("nees").at(claim);
         if (!nees.contains("histogram")) continue;
-        plot::Curve curve = curve_of(name, plot::Look::dots);
+        plot::Curve curve{.name = name, .look = plot::Look::dots};
         double at = 1;
         for (const Json& count : nees.at("histogram")) {
-            curve.x.push_back(at++ + shift);
-            curve.y.push_back(count.get<double>());
+            curve.add(at++ + shift, count.get<double>());
         }
         shift += 2 * kShift;
         total = nees.at("n").get<double>();
-        std::array<char, 120> text{};
-        std::snprintf(text.data(), text.size(),
-                      "%s: NEES %.2f of %.0f, %.2f to %.2f expected (95 %%)", name,
-                      number_at(nees, "/mean"), number_at(nees, "/expected"),
-                      number_at(nees, "/low"), number_at(nees, "/high"));
-        chart.notes.emplace_back(text.data());
+        chart.notes.push_back(printed("%s: NEES %.2f of %.0f, %.2f to %.2f expected (95 %%)", name,
+                                      number_at(nees, "/mean"), number_at(nees, "/expected"),
+                                      number_at(nees, "/low"), number_at(nees, "/high")));
         chart.curves.push_back(std::move(curve));
     }
     if (chart.curves.empty())
         chart.notes.emplace_back("no campaign determines all 30 coefficients: there is no NEES");
     const double share = 1.0 / study::kNeesBins, expected = share * total;
     const double half = 2 * std::sqrt(expected * (1 - share));
-    plot::Curve theory = level_line("theory", chart.x.low, chart.x.high, expected);
+    plot::Curve theory = plot::level_line("theory", chart.x.low, chart.x.high, expected);
     theory.low.assign(2, std::max(0.0, expected - half));
     theory.high.assign(2, expected + half);
     chart.curves.push_back(std::move(theory));
@@ -138,38 +113,33 @@ plot::Chart nees_chart(const Json& point) {
 
 /// Root of NEES / 30 over the grid: rms z with an interval that correlations do not touch.
 plot::Chart grid_chart(const Json& result) {
-    plot::Chart chart;
-    chart.title = "rms z over the grid, of 30 coefficients together";
-    chart.x = axis_of_points(result);
-    chart.y = plot::Axis("sqrt(NEES / 30)");
+    plot::Chart chart{"rms z over the grid, of 30 coefficients together", axis_of_points(result),
+                      plot::Axis("sqrt(NEES / 30)")};
     double shift = -kShift;
     for (const auto& [claim, name] : kClaims) {
-        plot::Curve curve = curve_of(name, plot::Look::dots);
+        plot::Curve curve{.name = name, .look = plot::Look::dots};
         for (const Json& point : result.at("points")) {
             const Json& nees = point.at("nees").at(claim);
             if (nees.at("n") == 0) continue;
             const double mean = number_at(nees, "/mean"), expected = number_at(nees, "/expected");
-            curve.x.push_back(point.at("point").get<double>() + shift);
-            curve.y.push_back(std::sqrt(mean / expected));
-            curve.low.push_back(std::sqrt(mean / number_at(nees, "/high")));
-            curve.high.push_back(std::sqrt(mean / number_at(nees, "/low")));
+            curve.add(point.at("point").get<double>() + shift, std::sqrt(mean / expected),
+                      std::sqrt(mean / number_at(nees, "/high")),
+                      std::sqrt(mean / number_at(nees, "/low")));
         }
         shift += 2 * kShift;
         chart.curves.push_back(std::move(curve));
     }
-    chart.curves.push_back(level_line("theory", chart.x.low, chart.x.high, 1));
+    chart.curves.push_back(plot::level_line("theory", chart.x.low, chart.x.high, 1));
     chart.notes = {"bars: 95 %"};
     return chart;
 }
 
 /// Root mean square of the errors of all coefficients of a unit, over the grid.
 plot::Chart error_chart(const Json& result, const std::string& unit) {
-    plot::Chart chart;
-    chart.title = "rms error over the grid";
-    chart.x = axis_of_points(result);
-    chart.y = plot::Axis("rms error, " + unit);
-    plot::Curve errors = curve_of("error", plot::Look::dots);
-    plot::Curve claimed = curve_of("claimed u, all inputs", plot::Look::dashed);
+    plot::Chart chart{"rms error over the grid", axis_of_points(result),
+                      plot::Axis("rms error, " + unit)};
+    plot::Curve errors{.name = "error", .look = plot::Look::dots};
+    plot::Curve claimed{.name = "claimed u, all inputs", .look = plot::Look::dashed};
     for (const Json& point : result.at("points")) {
         double squares = 0, claims = 0, count = 0, runs = 0;
         for (const Json& c : point.at("coefficients")) {
@@ -183,12 +153,8 @@ plot::Chart error_chart(const Json& result, const std::string& unit) {
         // As if the coefficients of a campaign were one: the interval is never too short.
         const auto rms =
             study::rms_interval(runs * squares / count, static_cast<std::uint64_t>(runs));
-        errors.x.push_back(point.at("point").get<double>());
-        errors.y.push_back(rms.value);
-        errors.low.push_back(rms.low);
-        errors.high.push_back(rms.high);
-        claimed.x.push_back(errors.x.back());
-        claimed.y.push_back(std::sqrt(claims / count));
+        errors.add(point.at("point").get<double>(), rms.value, rms.low, rms.high);
+        claimed.add(errors.x.back(), std::sqrt(claims / count));
     }
     chart.curves = {std::move(errors), std::move(claimed)};
     chart.notes = {"bars: 95 %"};
@@ -215,12 +181,12 @@ std::string write_campaign_charts(const Json& result, const std::string& folder)
         plot::Chart z =
             coefficient_chart(point, "rms of error over claimed u", "rms z",
                               {{"all inputs", "/all/rms_z"}, {"noise alone", "/noise/rms_z"}});
-        z.curves.push_back(level_line("theory", 1, 30, 1));
+        z.curves.push_back(plot::level_line("theory", 1, 30, 1));
         plot::write_file(folder + "/rms-z" + name + ".svg", z.svg());
         plot::Chart within = coefficient_chart(
             point, "share of errors within 1.96 u", "coverage",
             {{"all inputs", "/all/coverage/95"}, {"noise alone", "/noise/coverage/95"}});
-        within.curves.push_back(level_line("theory", 1, 30, 0.95));
+        within.curves.push_back(plot::level_line("theory", 1, 30, 0.95));
         plot::write_file(folder + "/coverage" + name + ".svg", within.svg());
         plot::write_file(folder + "/nees" + name + ".svg", nees_chart(point).svg());
     }
@@ -237,7 +203,8 @@ double z_of(const Json& recording, std::size_t i) {
 
 /// Of every coefficient over the recordings: rms z, and the share with E_n within 1.
 std::string write_recordings_charts(const Json& result, const std::string& folder) {
-    plot::Curve rms = curve_of("new against old", plot::Look::dots), within = rms;
+    plot::Curve rms = plot::Curve{.name = "new against old", .look = plot::Look::dots},
+                within = rms;
     plot::Chart z, coverage, each;
     std::vector<const Json*> compared;
     for (const Json& one : result.at("recordings")) {
@@ -258,20 +225,15 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
             if (std::abs(value) <= 2) ++good;
         }
         if (count == 0) continue;
-        const auto add = [at](plot::Curve& curve, const study::Interval& interval) {
-            curve.x.push_back(at);
-            curve.y.push_back(interval.value);
-            curve.low.push_back(interval.low);
-            curve.high.push_back(interval.high);
-        };
-        add(rms, study::rms_interval(squares, count));
-        add(within, study::share_interval(good, count));
+        for (const auto& [curve, of] : {std::pair{&rms, study::rms_interval(squares, count)},
+                                        {&within, study::share_interval(good, count)}})
+            curve->add(at, of.value, of.low, of.high);
     }
     const std::string note = std::to_string(compared.size()) + " recordings; bars: 95 %";
     z.title = "new less old result over both standard uncertainties";
     z.x = coverage.x = axis_of_coefficients();
     z.y = plot::Axis("rms z");
-    z.curves = {std::move(rms), level_line("independent results", 1, 30, 1)};
+    z.curves = {std::move(rms), plot::level_line("independent results", 1, 30, 1)};
     z.notes = {note, "both rest on the same data: less than 1 is to be expected"};
     coverage.title = "share of recordings with E_n within 1";
     coverage.y = plot::Axis("share");
@@ -280,16 +242,15 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
     plot::write_file(folder + "/rms-z.svg", z.svg());
     plot::write_file(folder + "/coverage.svg", coverage.svg());
 
-    plot::Curve largest = curve_of("largest of 30", plot::Look::dots);
+    plot::Curve largest{.name = "largest of 30", .look = plot::Look::dots};
     for (std::size_t k = 0; k < std::min(compared.size(), kMostCompared); ++k) {
-        largest.x.push_back(static_cast<double>(k + 1));
-        largest.y.push_back(compared[k]->at("largest_e_n").get<double>());
+        largest.add(static_cast<double>(k + 1), compared[k]->at("largest_e_n").get<double>());
     }
     const double last = std::max(2.0, largest.x.back());
     each.title = "E_n of each recording, those that differ most first";
     each.x = plot::Axis("recording");
     each.y = plot::Axis("largest E_n");
-    each.curves = {std::move(largest), level_line("expanded uncertainties", 1, last, 1)};
+    each.curves = {std::move(largest), plot::level_line("expanded uncertainties", 1, last, 1)};
     std::string remark;
     if (compared.size() > kMostCompared) {
         remark = first_of(kMostCompared, compared.size(), "recordings, those that differ most,") +
@@ -303,18 +264,15 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
 /// u and the ends of the intervals as drawn, against the budget's.
 std::string write_propagation_charts(const Json& result, const std::string& folder) {
     plot::Chart u, ends;
-    plot::Curve ratio = curve_of("drawn", plot::Look::dots);
-    std::array<plot::Curve, 2> off{curve_of("lower end", plot::Look::dots),
-                                   curve_of("upper end", plot::Look::dots)};
+    plot::Curve ratio{.name = "drawn", .look = plot::Look::dots};
+    std::array<plot::Curve, 2> off{plot::Curve{.name = "lower end", .look = plot::Look::dots},
+                                   plot::Curve{.name = "upper end", .look = plot::Look::dots}};
     double at = 0;
     for (const Json& c : result.at("coefficients")) {
         at += 1;
         if (!c.contains("value")) continue;
         const auto add = [](plot::Curve& curve, double x, double y, double half) {
-            curve.x.push_back(x);
-            curve.y.push_back(y);
-            curve.low.push_back(y - half);
-            curve.high.push_back(y + half);
+            curve.add(x, y, y - half, y + half);
         };
         const double budget = number_at(c, "/gum/u"), tolerance = number_at(c, "/tolerance");
         add(ratio, at, number_at(c, "/u") / budget, 2 * number_at(c, "/standard_error/u") / budget);
@@ -333,11 +291,11 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
     u.title = "rms z of the draws: u drawn over u of the budget";
     u.x = ends.x = axis_of_coefficients();
     u.y = plot::Axis("rms z");
-    u.curves = {std::move(ratio), level_line("budget", 1, 30, 1)};
+    u.curves = {std::move(ratio), plot::level_line("budget", 1, 30, 1)};
     ends.title = "ends of the 95 % intervals, drawn less budget";
     ends.y = plot::Axis("of the numerical tolerance");
-    ends.curves = {std::move(off[0]), std::move(off[1]), level_line("tolerance", 1, 30, 1),
-                   level_line("", 1, 30, -1)};
+    ends.curves = {std::move(off[0]), std::move(off[1]), plot::level_line("tolerance", 1, 30, 1),
+                   plot::level_line("", 1, 30, -1)};
     u.notes = ends.notes = {note};
     plot::write_file(folder + "/rms-z.svg", u.svg());
     plot::write_file(folder + "/interval-ends.svg", ends.svg());

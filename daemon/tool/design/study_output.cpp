@@ -1,12 +1,12 @@
 #include "daemon/tool/design/study_output.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/record/hdf5.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/design/study_recordings.hpp"
 
@@ -24,33 +24,26 @@ constexpr std::chrono::seconds kLines{60};
 constexpr int kBar = 30;
 constexpr std::size_t kMostRanges = 20;
 
-template <typename... Values>
-std::string formatted(const char* pattern, Values... values) {
-    std::array<char, 400> out{};
-    std::snprintf(out.data(), out.size(), pattern, values...);
-    return out.data();
-}
-
 std::string point_text(const Json& point) {
     const auto runs = point.at("runs").get<double>() - point.at("failed").get<double>();
     const Json& v = point.at("verdicts");
     const auto share = [&](const char* key) { return 100 * v.at(key).get<double>() / runs; };
     std::string text = grid_text(point) + "\n";
-    text += formatted(
+    text += printed(
         "  %.0f campaigns of %.2f h: valid %.1f %%, doubtful %.1f %%, not valid %.1f %%\n", runs,
         number_at(point, "/campaign_h"), share("valid"), share("doubtful"), share("not_valid"));
     for (const char* claim : {"noise", "all"}) {
         const Json& nees = point.at("nees").at(claim);
         if (nees.at("n") == 0) continue;
-        text += formatted("  NEES, %-15s %6.2f of %.0f (%.2f to %.2f expected, p %.2g)\n",
-                          std::string(claim) == "noise" ? "noise alone:" : "all inputs:",
-                          number_at(nees, "/mean"), number_at(nees, "/expected"),
-                          number_at(nees, "/low"), number_at(nees, "/high"), number_at(nees, "/p"));
+        text += printed("  NEES, %-15s %6.2f of %.0f (%.2f to %.2f expected, p %.2g)\n",
+                        std::string(claim) == "noise" ? "noise alone:" : "all inputs:",
+                        number_at(nees, "/mean"), number_at(nees, "/expected"),
+                        number_at(nees, "/low"), number_at(nees, "/high"), number_at(nees, "/p"));
     }
     for (const auto& [why, count] : point.at("failures").items())
-        text += formatted("  failed %ld times: ", count.get<long>()) + why + "\n";
+        text += printed("  failed %ld times: ", count.get<long>()) + why + "\n";
     for (const auto& [code, count] : point.at("reasons").items())
-        text += formatted("  %ld times: ", count.get<long>()) + code + "\n";
+        text += printed("  %ld times: ", count.get<long>()) + code + "\n";
     return text;
 }
 
@@ -60,7 +53,7 @@ std::string coefficients_text(const Json& point) {
         "within 68/95/99 %\n";
     for (const Json& c : point.at("coefficients")) {
         if (!c.contains("all")) continue;
-        text += formatted(
+        text += printed(
             "  %-11s %-10s %11.6f %10.6f %10.6f  %5.3f (%5.3f to %5.3f) %5.1f %5.1f %5.1f\n",
             c.at("name").get<std::string>().c_str(), c.at("unit").get<std::string>().c_str(),
             number_at(c, "/mean_error"), number_at(c, "/rms_error"), number_at(c, "/all/sigma"),
@@ -86,6 +79,17 @@ double number_at(const Json& json, const char* pointer) {
     return json.contains(at) && json.at(at).is_number() ? json.at(at).get<double>() : std::nan("");
 }
 
+std::string csv_number(double value) {
+    return std::isfinite(value) ? printed(",%.17g", value) : ",";
+}
+
+std::string done_text(const Json& result, const char* what) {
+    return line("%s: %ld of %ld %s, %ld failed%s", result.at("study").get<std::string>().c_str(),
+                result.at("done").get<long>(), result.at("tasks").get<long>(), what,
+                result.at("failed").get<long>(),
+                result.at("partial").get<bool>() ? ", PARTIAL" : "");
+}
+
 std::string grid_text(const Json& point) {
     std::string text;
     for (const auto& [key, value] : point.at("grid").items())
@@ -96,10 +100,7 @@ std::string grid_text(const Json& point) {
 std::string result_table(const Json& result) {
     if (result.contains("recordings")) return recordings_table(result);
     if (result.at("kind") == "uncertainty") return propagation_table(result);
-    std::string text = formatted(
-        "%s: %ld of %ld tasks, %ld failed%s\n", result.at("study").get<std::string>().c_str(),
-        result.at("done").get<long>(), result.at("tasks").get<long>(),
-        result.at("failed").get<long>(), result.at("partial").get<bool>() ? ", PARTIAL" : "");
+    std::string text = done_text(result, "tasks");
     const Json& points = result.at("points");
     for (const Json& point : points) {
         text += point_text(point);
@@ -119,20 +120,17 @@ std::string result_csv(const Json& result) {
         std::string grid = grid_text(point);
         std::ranges::replace(grid, '"', '\'');
         for (const Json& c : point.at("coefficients")) {
-            text +=
-                formatted("%ld,", point.at("point").get<long>()) + "\"" + grid + "\"," +
-                formatted("%ld,%ld,%s,%s,%ld", point.at("runs").get<long>(),
-                          point.at("failed").get<long>(), c.at("name").get<std::string>().c_str(),
-                          c.at("unit").get<std::string>().c_str(), c.at("n").get<long>());
+            text += printed("%ld,", point.at("point").get<long>()) + "\"" + grid + "\"," +
+                    printed("%ld,%ld,%s,%s,%ld", point.at("runs").get<long>(),
+                            point.at("failed").get<long>(), c.at("name").get<std::string>().c_str(),
+                            c.at("unit").get<std::string>().c_str(), c.at("n").get<long>());
             for (const char* pointer :
                  {"/mean_error", "/rms_error", "/all/sigma", "/all/rms_z/value", "/all/rms_z/low",
                   "/all/rms_z/high", "/all/coverage/68/value", "/all/coverage/95/value",
                   "/all/coverage/99/value", "/noise/sigma", "/noise/rms_z/value",
                   "/noise/rms_z/low", "/noise/rms_z/high", "/noise/coverage/68/value",
-                  "/noise/coverage/95/value", "/noise/coverage/99/value"}) {
-                const double value = number_at(c, pointer);
-                text += std::isfinite(value) ? formatted(",%.17g", value) : ",";
-            }
+                  "/noise/coverage/95/value", "/noise/coverage/99/value"})
+                text += csv_number(number_at(c, pointer));
             text += "\n";
         }
     }
@@ -179,15 +177,15 @@ std::string ranges_text(const std::vector<std::pair<std::uint64_t, std::uint64_t
 }
 
 std::string status_text(const study::StudyStatus& s) {
-    std::string text = formatted("%lu of %lu tasks done, %lu failed; %lu parts", s.done, s.tasks,
-                                 s.failed, s.parts);
-    if (s.duplicates > 0) text += formatted(", %lu tasks done twice", s.duplicates);
+    std::string text =
+        printed("%lu of %lu tasks done, %lu failed; %lu parts", s.done, s.tasks, s.failed, s.parts);
+    if (s.duplicates > 0) text += printed(", %lu tasks done twice", s.duplicates);
     text += s.missing == 0 ? "\n" : "; left: " + left_text(s.left_s) + "\n";
     for (const auto& part : s.running)
-        text += formatted(
-            "running: shard %lu of %lu on %s, process %ld: %lu tasks, written %.0f s ago\n",
-            part.shard.number, part.shard.of, part.host.c_str(), part.pid, part.records,
-            part.age_s);
+        text +=
+            printed("running: shard %lu of %lu on %s, process %ld: %lu tasks, written %.0f s ago\n",
+                    part.shard.number, part.shard.of, part.host.c_str(), part.pid, part.records,
+                    part.age_s);
     for (const auto& line : s.damaged) text += "damaged: " + line + "\n";
     for (const auto& line : s.foreign) text += "foreign: " + line + "\n";
     for (const auto& line : s.contradictions) text += "contradictory: " + line + "\n";
@@ -224,9 +222,9 @@ RunDisplay::RunDisplay() : next_(std::chrono::steady_clock::now() + kLines) {}
 void RunDisplay::show(const study::RunProgress& p) {
     if (p.all == 0) return;
     const auto share = static_cast<double>(p.done) / static_cast<double>(p.all);
-    const std::string words = formatted("%lu of %lu  %.1f %%  %.3g tasks/s  left: ", p.done, p.all,
-                                        100 * share, p.per_s) +
-                              left_text(p.left_s);
+    const std::string words =
+        printed("%lu of %lu  %.1f %%  %.3g tasks/s  left: ", p.done, p.all, 100 * share, p.per_s) +
+        left_text(p.left_s);
     const auto filled = static_cast<std::size_t>(share * kBar);
     progress_.show("[" + std::string(filled, '#') + std::string(kBar - filled, '.') + "] " + words);
     const auto now = std::chrono::steady_clock::now();

@@ -22,6 +22,10 @@ void write_hdf5(const nlohmann::ordered_json& result, const std::string& path);
 
 /// NaN if there is none.
 [[nodiscard]] double number_at(const nlohmann::ordered_json& json, const char* pointer);
+/// With a comma before it; NaN leaves the field empty.
+[[nodiscard]] std::string csv_number(double value);
+/// The first line of a table: how much is done of `what`.
+[[nodiscard]] std::string done_text(const nlohmann::ordered_json& result, const char* what);
 /// A point's place in the grid: "campaign.table_g = [9, 7], ...", or "all runs".
 [[nodiscard]] std::string grid_text(const nlohmann::ordered_json& point);
 

@@ -1,13 +1,13 @@
 #include "daemon/tool/design/study_recordings.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "daemon/record/hdf5.hpp"
+#include "daemon/results/text_line.hpp"
+#include "daemon/tool/design/study_output.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool::studies {
@@ -44,22 +44,19 @@ std::size_t place_of(const std::string& coefficient) {
 }
 
 std::string row(const Json& one) {
-    std::array<char, 400> text{};
     const std::string words = word_of(one.at("old")) + " -> " + word_of(one.at("new"));
     if (!one.at("coefficient").is_string()) {
-        std::snprintf(
-            text.data(), text.size(), "%-28s %-10s %-22s %s\n", name_of(one).c_str(),
+        return line(
+            "%-28s %-10s %-22s %s", name_of(one).c_str(),
             one.at("serial").get<std::string>().c_str(), words.c_str(),
             one.at("old").is_object() ? "no coefficient in both" : "the recording has no result");
-        return text.data();
     }
     const std::string coefficient = one.at("coefficient");
     const std::size_t i = place_of(coefficient);
-    std::snprintf(text.data(), text.size(), "%-28s %-10s %-22s %-6s %12.6f %12.6f %10.3g %8.3f\n",
-                  name_of(one).c_str(), one.at("serial").get<std::string>().c_str(), words.c_str(),
-                  coefficient.c_str(), entry(one, "old", "value", i), entry(one, "new", "value", i),
-                  value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i)));
-    return text.data();
+    return line("%-28s %-10s %-22s %-6s %12.6f %12.6f %10.3g %8.3f", name_of(one).c_str(),
+                one.at("serial").get<std::string>().c_str(), words.c_str(), coefficient.c_str(),
+                entry(one, "old", "value", i), entry(one, "new", "value", i),
+                value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i)));
 }
 
 std::string csv_text(const std::string& text) {
@@ -71,18 +68,11 @@ std::string csv_text(const std::string& text) {
 }  // namespace
 
 std::string recordings_table(const Json& result) {
-    std::array<char, 400> text{};
-    std::snprintf(text.data(), text.size(), "%s: %ld of %ld recordings, %ld failed%s\n",
-                  result.at("study").get<std::string>().c_str(), result.at("done").get<long>(),
-                  result.at("tasks").get<long>(), result.at("failed").get<long>(),
-                  result.at("partial").get<bool>() ? ", PARTIAL" : "");
-    std::string out = text.data();
+    std::string out = done_text(result, "recordings");
     for (const auto& [key, value] : result.at("settings").items())
         out += "with " + key + " = " + value.get<std::string>() + "\n";
-    std::snprintf(text.data(), text.size(), "%-28s %-10s %-22s %-6s %12s %12s %10s %8s\n",
-                  "recording", "serial", "verdict, old -> new", "worst", "old", "new", "in old u",
-                  "E_n");
-    out += text.data();
+    out += line("%-28s %-10s %-22s %-6s %12s %12s %10s %8s", "recording", "serial",
+                "verdict, old -> new", "worst", "old", "new", "in old u", "E_n");
     const Json& all = result.at("recordings");
     for (std::size_t i = 0; i < std::min(all.size(), kMostShown); ++i) {
         const Json& one = all[i];
@@ -109,11 +99,8 @@ std::string recordings_csv(const Json& result) {
             for (const double value :
                  {entry(one, "old", "value", i), entry(one, "old", "u", i),
                   entry(one, "new", "value", i), entry(one, "new", "u", i),
-                  value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i))}) {
-                std::array<char, 40> number{};
-                std::snprintf(number.data(), number.size(), ",%.17g", value);
-                out += std::isfinite(value) ? number.data() : ",";
-            }
+                  value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i))})
+                out += csv_number(value);
             out += "\n";
         }
     }
