@@ -1,10 +1,4 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <cmath>
-#include <exception>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
@@ -71,32 +65,19 @@ void check(Options& options) {
 
 int run(Options& options) {
     PlanStudy result;
-    try {
-        check(options);
-        {
-            Progress progress("planning");
-            progress.show(0, 1);
-            result = options.request.survey.asked() ? survey_study(options.request)
-                                                    : study(options.request);
-        }
-        if (!options.output.empty()) plot::write_file(options.output, plan_json(result) + "\n");
-        if (!options.plot.empty()) {
-            std::filesystem::path path(options.plot);
-            if (path.extension() != ".svg") {
-                plot::make_folder(options.plot);
-                path /= "sphere.svg";
-            }
-            plot::write_file(path.string(), plan_picture(result, frame_of(options.request)));
-        }
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-        return kBadInput;
+    check(options);
+    {
+        Progress progress("planning");
+        progress.show(0, 1);
+        result =
+            options.request.survey.asked() ? survey_study(options.request) : study(options.request);
     }
+    if (!options.output.empty()) plot::write_file(options.output, plan_json(result) + "\n");
+    if (!options.plot.empty())
+        plot::write_pictures(options.plot,
+                             {{"sphere", plan_picture(result, frame_of(options.request))}});
     std::cout << (options.json ? plan_json(result) + "\n" : plan_table(result)) << std::flush;
-    if (!std::cout) {
-        std::cerr << "standard output: cannot be written\n";
-        return kBadInput;
-    }
+    if (!std::cout) return 0;  // told by guarded()
     if (!result.refusal.empty()) {
         std::cerr << "refused: " << result.refusal << '\n';
         return kNo;
@@ -295,9 +276,10 @@ void add_plan(CLI::App& app, int& exit_code) {
     command->callback([options, order, &exit_code] {
         if (options->request.survey.asked() && order->count() == 0)
             options->request.order = "balanced";
-        exit_code = options->on_turntable
-                        ? guarded([&] { return planner::run_turntable(*options); })
-                        : planner::run(*options);
+        exit_code = guarded([&] {
+            return options->on_turntable ? planner::run_turntable(*options)
+                                         : planner::run(*options);
+        });
     });
 }
 

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/tool/analysis/uncertainty_text.hpp"
@@ -54,7 +53,7 @@ Json survey_json(const Survey& of) {
                          {"dwells", of.dwells[k]}});
     }
     for (const auto& [hz, share] : of.smallest_seen)
-        seen[format("%g", hz)] = proto::number_or_null(share);
+        seen[printed("%g", hz)] = proto::number_or_null(share);
     Json about = Json::array();
     for (const auto& one : of.about)
         about.push_back({{"gyro", std::string(1, "xyz"[one.gyro])},
@@ -73,39 +72,39 @@ Json survey_json(const Survey& of) {
 }
 
 std::string survey_text(const Survey& of) {
-    std::string text = format("\nsurvey, %s mount\n", of.hard ? "hard" : "isolated");
+    std::string text = printed("\nsurvey, %s mount\n", of.hard ? "hard" : "isolated");
     for (std::size_t k = 0; k < of.lines.size(); ++k) {
         const auto& line = of.lines[k];
-        text += format("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells, coning %.1e%s%s\n",
-                       line.hz, line.level_g, line.table_g, of.dwells[k], coning_of(line),
-                       line.hz != line.asked_hz
-                           ? format(", for %.6g Hz, which is not free", line.asked_hz).c_str()
-                           : "",
-                       line.limited ? ", the shaker's limit" : "");
+        text += printed("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells, coning %.1e%s%s\n",
+                        line.hz, line.level_g, line.table_g, of.dwells[k], coning_of(line),
+                        line.hz != line.asked_hz
+                            ? printed(", for %.6g Hz, which is not free", line.asked_hz).c_str()
+                            : "",
+                        line.limited ? ", the shaker's limit" : "");
     }
-    text += format(
+    text += printed(
         "coning: deg/h/g^2 at most, if the platform turns by %g arcsec in step with the "
         "vibration\n",
         kConingArcsec);
     for (const auto& one : of.about)
-        text += format("about the resonance of gyro %c at %.4g Hz: %.6g and %.6g Hz\n",
-                       "xyz"[one.gyro], one.resonance_hz, one.below_hz, one.above_hz);
+        text += printed("about the resonance of gyro %c at %.4g Hz: %.6g and %.6g Hz\n",
+                        "xyz"[one.gyro], one.resonance_hz, one.below_hz, one.above_hz);
     text += "smallest elastic share of all quadratic coefficients that is seen with 90 %:";
     if (of.smallest_seen.empty()) text += "  none, at one frequency";
     for (const auto& [hz, share] : of.smallest_seen)
-        text += format("  %.3g %% at %g Hz", 100 * share, hz);
-    text += format("\na flat verdict reaches to %g Hz\n", of.highest_hz);
+        text += printed("  %.3g %% at %g Hz", 100 * share, hz);
+    text += printed("\na flat verdict reaches to %g Hz\n", of.highest_hz);
     if (of.predicted_u_deg_h)
-        text += format("drift under %s: u %.4g deg/h, rms over resonances that may be\n",
-                       of.profile.c_str(), *of.predicted_u_deg_h);
+        text += printed("drift under %s: u %.4g deg/h, rms over resonances that may be\n",
+                        of.profile.c_str(), *of.predicted_u_deg_h);
     return text;
 }
 
 std::string shaken(const PlanRun& run) {
     if (run.sweep.any())
-        return format("  %.6g to %.6g Hz in %.6g s", run.sweep.from_hz, run.sweep.to_hz,
-                      run.sweep.seconds);
-    return run.frequency_hz > 0 ? format("  %.6g Hz", run.frequency_hz) : "";
+        return printed("  %.6g to %.6g Hz in %.6g s", run.sweep.from_hz, run.sweep.to_hz,
+                       run.sweep.seconds);
+    return run.frequency_hz > 0 ? printed("  %.6g Hz", run.frequency_hz) : "";
 }
 
 constexpr std::array<const char*, 6> kProducts{"xx", "yy", "zz", "xy", "xz", "yz"};
@@ -130,18 +129,18 @@ Json sweeps_json(const Sweeps& of) {
 }
 
 std::string sweeps_text(const Sweeps& of) {
-    std::string text = format(
+    std::string text = printed(
         "\nsweeps up and down between %.6g and %.6g Hz in %.6g s at three positions, "
         "%.4g g at the table, %.4g to %.4g g at the platform\n",
         of.from_hz, of.to_hz, of.seconds, of.table_g, of.lowest_g, of.highest_g);
     for (const auto& [word, one] : {std::pair{"up", of.up}, std::pair{"down", of.down}})
-        text += format(
+        text += printed(
             "  %-4s %.3g %% usable: %zu of %zu s are off the forbidden frequencies, with "
             "%zu rates between neighbours\n",
             word, 100 * one.share(), one.known, one.blocks, one.rates);
     text += "  they see of the elastic part of a gyro (1: a whole sweep along that axis):";
     for (std::size_t k = 0; k < kProducts.size(); ++k)
-        text += format(" %s %.3g", kProducts[k], of.seen[k]);
+        text += printed(" %s %.3g", kProducts[k], of.seen[k]);
     return text + "\n";
 }
 
@@ -244,38 +243,38 @@ std::string plan_table(const PlanStudy& study) {
     std::size_t number = 1;
     for (const PlanRun& run : study.runs) {
         const auto p = to_attitude(study.rig, run.visit.position_deg);
-        text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu%s\n", number++, p[0], p[1],
-                       p[2], run.visit.level_g, run.table_g, run.count, shaken(run).c_str());
+        text += printed("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu%s\n", number++, p[0], p[1],
+                        p[2], run.visit.level_g, run.table_g, run.count, shaken(run).c_str());
     }
     const planning::Evaluation& e = study.evaluation;
     const std::size_t sweeps = sweeps_of(study);
-    text += format("\n%zu runs of %g s%s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
-                   count_of(study) - sweeps, study.dwell_s,
-                   sweeps > 0 ? format(" and %zu sweeps", sweeps).c_str() : "",
-                   study.duration.total_s / 3600, study.duration.vibrating_s / 3600,
-                   study.duration.slewing_s / 3600);
-    text += format("rank %zu of %zu", e.rank, e.coefficients);
+    text += printed("\n%zu runs of %g s%s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
+                    count_of(study) - sweeps, study.dwell_s,
+                    sweeps > 0 ? printed(" and %zu sweeps", sweeps).c_str() : "",
+                    study.duration.total_s / 3600, study.duration.vibrating_s / 3600,
+                    study.duration.slewing_s / 3600);
+    text += printed("rank %zu of %zu", e.rank, e.coefficients);
     if (e.identifies_all()) {
         text +=
-            format(", condition %.4g, strongest correlation %.2f (%s, %s)\n", e.condition,
-                   e.correlation, planning::kTermNames[e.first], planning::kTermNames[e.second]);
-        text += format(
+            printed(", condition %.4g, strongest correlation %.2f (%s, %s)\n", e.condition,
+                    e.correlation, planning::kTermNames[e.first], planning::kTermNames[e.second]);
+        text += printed(
             "D-efficiency %.4f (at least %.4f by the equivalence bound), A %.4f, E >= "
             "%.4f\n",
             study.d_efficiency, study.bound, study.a_efficiency, study.e_efficiency);
         text += "optimum over the same candidates and levels:";
         for (const auto& [level, share] : study.optimal_shares)
-            text += format("  %.4g of the runs at %.4g g", share, level);
-        text += format("\ncorrelation of place in the order with a term, at most %.2f\n",
-                       study.drift_imbalance);
+            text += printed("  %.4g of the runs at %.4g g", share, level);
+        text += printed("\ncorrelation of place in the order with a term, at most %.2f\n",
+                        study.drift_imbalance);
     } else {
         text += '\n';
     }
     if (!study.vertical_axes.empty()) {
         text += "\nvertical at zero angles  directions  rank, one level / all  D-efficiency *\n";
         for (const VerticalAxis& axis : study.vertical_axes) {
-            text += format("  %c %33zu %12zu / %-7zu %13.3f\n", axis.axis, axis.directions,
-                           axis.rank_one_level, axis.rank, axis.d_efficiency);
+            text += printed("  %c %33zu %12zu / %-7zu %13.3f\n", axis.axis, axis.directions,
+                            axis.rank_one_level, axis.rank, axis.d_efficiency);
         }
         text += "  * against free directions at rest and at the highest level\n";
     }
@@ -284,7 +283,7 @@ std::string plan_table(const PlanStudy& study) {
     text += '\n' + plan::forecast_table(study.forecast);
     if (study.uncertainty) {
         const auto& merit = study.uncertainty->merit;
-        text += format(
+        text += printed(
             "\norder: a bias that walks and drifts makes sigma of D_F %.2f, of the worst %.4g, of "
             "most %.2f times as large; one that steps, %.4g\n\n",
             merit.bias, merit.largest, merit.median, merit.step);

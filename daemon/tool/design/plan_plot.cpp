@@ -1,5 +1,4 @@
 #include <cmath>
-#include <cstdio>
 #include <map>
 
 #include "daemon/tool/design/plan_study.hpp"
@@ -43,19 +42,19 @@ Spot project(const planning::Vec3& u) {
 std::string globes() {
     std::string svg;
     for (const double x : {kLeft, kRight}) {
-        svg += format("<circle class='globe' cx='%g' cy='%g' r='%g'/>\n", x, kMiddle, kRadius);
-        svg += format("<path class='grid' d='M%g %gH%gM%g %gV%g'/>\n", x - kRadius, kMiddle,
-                      x + kRadius, x, kMiddle - kRadius, kMiddle + kRadius);
-        svg += format("<text x='%g' y='%g' text-anchor='middle'>+y</text>\n", x,
-                      kMiddle - kRadius - 6);
+        svg += printed("<circle class='globe' cx='%g' cy='%g' r='%g'/>\n", x, kMiddle, kRadius);
+        svg += printed("<path class='grid' d='M%g %gH%gM%g %gV%g'/>\n", x - kRadius, kMiddle,
+                       x + kRadius, x, kMiddle - kRadius, kMiddle + kRadius);
+        svg += printed("<text x='%g' y='%g' text-anchor='middle'>+y</text>\n", x,
+                       kMiddle - kRadius - 6);
     }
-    svg += format("<text x='%g' y='%g'>+x</text>\n", kLeft + kRadius + 5, kMiddle + 4);
-    svg += format("<text x='%g' y='%g' text-anchor='end'>+x</text>\n", kRight - kRadius - 5,
-                  kMiddle + 22);
-    svg += format("<text x='%g' y='%g' text-anchor='middle'>from +z</text>\n", kLeft,
-                  kMiddle + kRadius + 20);
-    svg += format("<text x='%g' y='%g' text-anchor='middle'>from -z</text>\n", kRight,
-                  kMiddle + kRadius + 20);
+    svg += printed("<text x='%g' y='%g'>+x</text>\n", kLeft + kRadius + 5, kMiddle + 4);
+    svg += printed("<text x='%g' y='%g' text-anchor='end'>+x</text>\n", kRight - kRadius - 5,
+                   kMiddle + 22);
+    svg += printed("<text x='%g' y='%g' text-anchor='middle'>from +z</text>\n", kLeft,
+                   kMiddle + kRadius + 20);
+    svg += printed("<text x='%g' y='%g' text-anchor='middle'>from -z</text>\n", kRight,
+                   kMiddle + kRadius + 20);
     return svg;
 }
 
@@ -86,7 +85,7 @@ std::string plan_picture(const PlanStudy& study, const estimator::Settings& fram
                                    1e-6 * static_cast<double>(direction[2])});
         const std::size_t c = colour[level];
         const double shift = 9 * (static_cast<double>(c) - 0.5 * static_cast<double>(next - 1));
-        svg += format(
+        svg += printed(
             "<circle class='dot c%zu' cx='%.1f' cy='%.1f' r='%.2f'><title>%zu at %g "
             "g</title></circle>\n",
             c % kColours, spot.x + shift, spot.y, kDot * std::sqrt(static_cast<double>(count)),
@@ -94,14 +93,14 @@ std::string plan_picture(const PlanStudy& study, const estimator::Settings& fram
     }
     double y = 60;
     for (const auto& [level, c] : colour) {
-        svg += format(
+        svg += printed(
             "<circle class='c%zu' cx='408' cy='%g' r='6'/><text x='420' y='%g'>%.4g "
             "g</text>\n",
             c % kColours, y, y + 4, level);
         y += 20;
     }
-    svg += format("<text x='20' y='490'>Area: runs. D-efficiency %.3f, rank %zu of %zu.</text>\n",
-                  study.d_efficiency, study.evaluation.rank, study.evaluation.coefficients);
+    svg += printed("<text x='20' y='490'>Area: runs. D-efficiency %.3f, rank %zu of %zu.</text>\n",
+                   study.d_efficiency, study.evaluation.rank, study.evaluation.coefficients);
     return svg + "</svg>\n";
 }
 

@@ -26,12 +26,6 @@ constexpr std::size_t kMostCandidates = 20'000;
 constexpr double kSameLevel = 1e-9;
 constexpr double kSameDirection = 1e-6;
 
-std::string text(double value) {
-    std::array<char, 32> out{};
-    std::snprintf(out.data(), out.size(), "%.6g", value);
-    return out.data();
-}
-
 bool counts_as_gimbals(const estimator::Settings& rig) {
     return rig.encoder_sign == std::array{1, 1, 1} &&
            rig.encoder_zero_deg == std::array{0.0, 0.0, 0.0};
@@ -69,9 +63,11 @@ class Study {
             listed_ = positions_in(request_.positions);
             for (const Vec3& p : listed_) {
                 if (!limits_.allow(p)) {
-                    throw std::runtime_error(request_.positions + ": found (" + text(p[0]) + ", " +
-                                             text(p[1]) + ", " + text(p[2]) +
-                                             ") deg, expected positions within the limits");
+                    throw std::runtime_error(
+                        request_.positions +
+                        printed(": found (%.6g, %.6g, %.6g) deg, expected positions within the "
+                                "limits",
+                                p[0], p[1], p[2]));
                 }
             }
         }
@@ -161,10 +157,10 @@ class Study {
         const double mps2 = table * c_.estimator.gravity_mps2;
         const auto check = [&](double value, double limit, const char* unit, const char* key) {
             if (value <= limit * (1 + 1e-9)) return;
-            const std::string message = text(level) + " g at the platform is " + text(table) +
-                                        " g at the table, " + text(value) + " " + unit +
-                                        " peak: more than " + text(limit) + " " + unit + " (" +
-                                        key + ")";
+            const std::string message = printed(
+                "%.6g g at the platform is %.6g g at the table, %.6g %s peak: more than "
+                "%.6g %s (%s)",
+                level, table, value, unit, limit, unit, key);
             if (!request_.config.empty()) throw std::runtime_error("levels: found " + message);
             out_.warnings.push_back(message);
             out_.beyond_limits = true;
@@ -271,12 +267,12 @@ class Study {
                 if (away < kSameDirection) break;
             }
             if (at == candidates_.problem.size()) {
-                throw std::runtime_error(request_.done + ": found a run at (" +
-                                         text(run.position_deg[0]) + ", " +
-                                         text(run.position_deg[1]) + ", " +
-                                         text(run.position_deg[2]) + ") deg, " + text(run.level_g) +
-                                         " g, expected candidates of this plan (--positions, "
-                                         "--levels)");
+                throw std::runtime_error(request_.done +
+                                         printed(": found a run at (%.6g, %.6g, %.6g) deg, %.6g g, "
+                                                 "expected candidates of this plan (--positions, "
+                                                 "--levels)",
+                                                 run.position_deg[0], run.position_deg[1],
+                                                 run.position_deg[2], run.level_g));
             }
             effort[at] += static_cast<double>(run.count);
         }
@@ -381,9 +377,9 @@ class Study {
         out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period());
         if (out_.uncertainty->merit.step > kMostStep)
             out_.warnings.push_back(
-                format("in this order one step of a bias makes a standard error %.3g times as "
-                       "large: --order balanced",
-                       out_.uncertainty->merit.step));
+                printed("in this order one step of a bias makes a standard error %.3g times as "
+                        "large: --order balanced",
+                        out_.uncertainty->merit.step));
     }
 
     void judge() {

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <array>
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/plan/forecast.hpp"
 #include "daemon/plan/plan_file.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/plan_uncertainty.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
@@ -20,13 +20,6 @@
 namespace vibrig::tool::planner {
 
 namespace planning = estimator::plan;
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-    std::array<char, 400> out{};
-    std::snprintf(out.data(), out.size(), pattern, values...);
-    return out.data();
-}
 
 /// What `vibrig plan` is asked.
 struct SurveyRequest {

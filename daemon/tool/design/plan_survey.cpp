@@ -30,8 +30,6 @@ constexpr std::size_t kAtFurther = 7;  ///< dwells of each further frequency
 constexpr double kIsolatedUpTo = 30;   ///< Hz; beyond it little passes the isolators
 constexpr Index kOfFrequency = 6;
 
-std::string short_number(double value) { return format("%.6g", value); }
-
 class SurveyPlan {
   public:
     explicit SurveyPlan(const PlanRequest& request)
@@ -126,9 +124,10 @@ class SurveyPlan {
         return c_.estimator.accelerometer_response.power(hz) >= estimator::kLeastSeen;
     }
     void tell_unseen(double hz) {
-        warnings_.push_back(short_number(hz) + " Hz is left out: the accelerometers see " +
-                            short_number(c_.estimator.accelerometer_response.power(hz)) +
-                            " of its power, half of it is needed");
+        warnings_.push_back(
+            printed("%.6g Hz is left out: the accelerometers see %.6g of its power, half of it is "
+                    "needed",
+                    hz, c_.estimator.accelerometer_response.power(hz)));
     }
     void leave_out_unseen(std::vector<double>& listed) {
         std::erase_if(listed, [this](double hz) {
@@ -147,9 +146,9 @@ class SurveyPlan {
         while (hz > least && !sees(hz)) hz = std::max(least, std::round(10 * kStep * hz) / 10);
         if (hz < highest)
             warnings_.push_back(
-                "the plan goes up to " + short_number(hz) + " Hz and not to " +
-                short_number(highest) +
-                " Hz: beyond it the accelerometers see less than half of the power");
+                printed("the plan goes up to %.6g Hz and not to %.6g Hz: beyond it the "
+                        "accelerometers see less than half of the power",
+                        hz, highest));
         return hz;
     }
 
@@ -170,9 +169,9 @@ class SurveyPlan {
         const double level = *std::max_element(request_.levels_g.begin(), request_.levels_g.end());
         for (const double other : request_.levels_g) {
             if (other != 0 && other != level)
-                throw std::runtime_error("--levels: found " + short_number(other) + " and " +
-                                         short_number(level) +
-                                         " g, expected one level with --frequencies");
+                throw std::runtime_error(printed(
+                    "--levels: found %.6g and %.6g g, expected one level with --frequencies", other,
+                    level));
         }
         if (!(level > 0)) throw std::runtime_error("--levels: found 0 g, expected a level above 0");
         return level;
@@ -189,9 +188,10 @@ class SurveyPlan {
         if (highest <= 0 && profile_top_ > last) {
             highest = std::min(profile_top_, std::max(last, c_.spectrum.highest_hz));
             if (highest < profile_top_)
-                warnings_.push_back("the profile reaches to " + short_number(profile_top_) +
-                                    " Hz, the plan to " + short_number(highest) +
-                                    " Hz (spectrum.highest_hz): what lies beyond is not measured");
+                warnings_.push_back(
+                    printed("the profile reaches to %.6g Hz, the plan to %.6g Hz "
+                            "(spectrum.highest_hz): what lies beyond is not measured",
+                            profile_top_, highest));
         }
         highest = seen_up_to(highest, last);
         const double level = this->level();
@@ -213,18 +213,18 @@ class SurveyPlan {
             const double rate = 1 / period();
             const bool bad = spectrum::forbidden(line.asked_hz, rate, c_.estimator.level_window_s);
             if (line.hz != line.asked_hz)
-                warnings_.push_back(short_number(line.asked_hz) + " Hz is " +
-                                    (bad ? "forbidden" : "not free up to its 8th harmonic") +
-                                    " at " + short_number(rate) +
-                                    " samples/s: the nearest free frequency, " +
-                                    short_number(line.hz) + " Hz, is planned");
+                warnings_.push_back(
+                    printed("%.6g Hz is %s at %.6g samples/s: the nearest free frequency, %.6g Hz, "
+                            "is planned",
+                            line.asked_hz, bad ? "forbidden" : "not free up to its 8th harmonic",
+                            rate, line.hz));
             if (line.limited)
-                warnings_.push_back(short_number(line.hz) + " Hz: the shaker's limits leave " +
-                                    short_number(line.level_g) + " g of " + short_number(level) +
-                                    " g at the platform" +
-                                    (!mount_.hard && line.hz > kIsolatedUpTo
-                                         ? ": frequencies above 30 Hz want the hard mount"
-                                         : ""));
+                warnings_.push_back(
+                    printed("%.6g Hz: the shaker's limits leave %.6g g of %.6g g at the platform%s",
+                            line.hz, line.level_g, level,
+                            !mount_.hard && line.hz > kIsolatedUpTo
+                                ? ": frequencies above 30 Hz want the hard mount"
+                                : ""));
         }
     }
 

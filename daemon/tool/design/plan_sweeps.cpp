@@ -21,8 +21,6 @@ constexpr double kLeastUsable = 0.5;
 constexpr double kLeastRatio = 1.1;  ///< of a plan file's ends
 constexpr double kLeast_g = 0.1;     ///< less is hardly a vibration
 
-std::string in_short(double value) { return format("%.6g", value); }
-
 /// 65 frequencies as vibrigd --check has them, and those at which the transmission was measured.
 std::vector<double> along(const std::array<double, 2>& ends, const spectrum::Mount& mount) {
     constexpr int kSteps = 64;
@@ -71,39 +69,40 @@ void PlannedSweeps::check_range() const {
         throw std::runtime_error("--sweeps: found " + found + ", expected " + expected);
     };
     const double low = asked_.sweeps[0], high = asked_.sweeps[1];
-    const std::string range = in_short(low) + " to " + in_short(high) + " Hz";
+    const std::string range = printed("%.6g to %.6g Hz", low, high);
     if (!(high >= kLeastRatio * low))
         refuse(range, "LOW,HIGH in Hz, the second 10 % above the first at least");
     if (low < mount_.lowest_hz())
         refuse(range,
-               in_short(mount_.lowest_hz()) + " Hz at least: below it the isolators amplify");
+               printed("%.6g Hz at least: below it the isolators amplify", mount_.lowest_hz()));
     for (const double hz : along({low, high}, mount_)) {
         if (!mount_.transmission(hz))
-            refuse(range, "frequencies within " + in_short(mount_.measured.front().first) + " to " +
-                              in_short(mount_.measured.back().first) +
-                              " Hz, where spectrum.transmission is known");
+            refuse(range, printed("frequencies within %.6g to %.6g Hz, where spectrum.transmission "
+                                  "is known",
+                                  mount_.measured.front().first, mount_.measured.back().first));
         const double seen = c_.estimator.accelerometer_response.power(hz);
         if (seen < estimator::kLeastSeen)
-            refuse(range, "frequencies of which the accelerometers see half of the power: at " +
-                              in_short(hz) + " Hz they see " + in_short(seen));
+            refuse(range, printed("frequencies of which the accelerometers see half of the power: "
+                                  "at %.6g Hz they see %.6g",
+                                  hz, seen));
     }
     const double octaves_per_minute = 60 * std::log2(high / low) / asked_.sweep_s;
     if (const auto& told = c_.shaker.registers.sweep;
         told && std::round(octaves_per_minute / told->rate.scale) < 1)
-        refuse(range + " in " + in_short(asked_.sweep_s) + " s, " + in_short(octaves_per_minute) +
-                   " octaves a minute",
-               in_short(told->rate.scale) +
-                   " at least, the step of shaker.registers.sweep_rate: a shorter sweep");
+        refuse(range +
+                   printed(" in %.6g s, %.6g octaves a minute", asked_.sweep_s, octaves_per_minute),
+               printed("%.6g at least, the step of shaker.registers.sweep_rate: a shorter sweep",
+                       told->rate.scale));
     const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
     for (const auto& ends : {std::pair{low, high}, std::pair{high, low}}) {
         const auto usable =
             spectrum::usable_blocks({ends.first, ends.second, asked_.sweep_s}, rate);
-        const std::string of = format(
+        const std::string of = printed(
             "%s at %.6g samples/s: with %zu of %zu s harmonics up to the 5th are off "
             "multiples of the rate, and %zu rates between neighbours (%.3g %%)",
             range.c_str(), rate, usable.known, usable.blocks, usable.rates, 100 * usable.share());
         if (rate < kLeastRate_hz)
-            refuse(of, in_short(kLeastRate_hz) + " samples/s at least (can.sample_rate_hz)");
+            refuse(of, printed("%.6g samples/s at least (can.sample_rate_hz)", kLeastRate_hz));
         if (usable.share() < kLeastUsable)
             refuse(of, "half of them at least: more samples/s, a longer sweep, or another range");
     }
@@ -135,9 +134,10 @@ void PlannedSweeps::choose_level(double level_g) {
     // Three decimals, rounded down: what is written out stays within the limit.
     if (by_table || at_platform < level_g) table_g = std::floor(table_g * 1e3) / 1e3;
     if (!(table_g >= kLeast_g))
-        throw std::runtime_error("--sweeps: found " + in_short(table_g) +
-                                 " g at the table left by the limits at " + in_short(tightest_hz) +
-                                 " Hz, expected " + in_short(kLeast_g) + " g at least");
+        throw std::runtime_error(printed(
+            "--sweeps: found %.6g g at the table left by the limits at %.6g Hz, expected %.6g g at "
+            "least",
+            table_g, tightest_hz, kLeast_g));
     told_.table_g = table_g;
     told_.from_hz = ends[0];
     told_.to_hz = ends[1];
@@ -152,11 +152,14 @@ void PlannedSweeps::choose_level(double level_g) {
     told_.up = spectrum::usable_blocks({ends[0], ends[1], asked_.sweep_s}, rate);
     told_.down = spectrum::usable_blocks({ends[1], ends[0], asked_.sweep_s}, rate);
     if (by_table)
-        warnings_.push_back("sweeps: the shaker's limits leave " + in_short(table_g) +
-                            " g at the table, at " + in_short(tightest_hz) + " Hz");
+        warnings_.push_back(
+            printed("sweeps: the shaker's limits leave %.6g g at the table, at "
+                    "%.6g Hz",
+                    table_g, tightest_hz));
     else if (at_platform < level_g)
-        warnings_.push_back("sweeps: accelerometer.range_g leaves " + in_short(at_platform) +
-                            " g of " + in_short(level_g) + " g at the platform");
+        warnings_.push_back(
+            printed("sweeps: accelerometer.range_g leaves %.6g g of %.6g g at the platform",
+                    at_platform, level_g));
 }
 
 void PlannedSweeps::put_before(PlanStudy& study, const planning::Timing& timing) const {

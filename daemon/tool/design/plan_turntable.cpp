@@ -55,7 +55,7 @@ void check(const TurntableRequest& request) {
     for (std::size_t i = 0; i < spheres.size(); ++i) {
         if (!(spheres[i] > 0) || !std::isfinite(spheres[i]) ||
             (i > 0 && spheres[i] <= spheres[i - 1]))
-            throw std::runtime_error("--spheres: found " + format("%g", spheres[i]) +
+            throw std::runtime_error("--spheres: found " + printed("%g", spheres[i]) +
                                      ", expected growing radii above 0");
     }
     if (request.allocation != "free" && spheres.size() != 2) {
@@ -83,8 +83,9 @@ void find_growth(const planning::Counts& counts, const planning::Terms& terms,
 
 void judge(const planning::Problem& problem, TurntablePlan& plan) {
     if (!plan.evaluation.identifies_all()) {
-        plan.refusal = format("rank %zu of %zu: %s not determined", plan.evaluation.rank,
-                              plan.evaluation.coefficients, plan.evaluation.undetermined().c_str());
+        plan.refusal =
+            printed("rank %zu of %zu: %s not determined", plan.evaluation.rank,
+                    plan.evaluation.coefficients, plan.evaluation.undetermined().c_str());
         if (plan.request.spheres.size() == 1) {
             plan.refusal +=
                 "; on one sphere D0 and the squares are one combination: a second "
@@ -179,27 +180,27 @@ std::string turntable_json(const TurntablePlan& plan) {
 std::string turntable_table(const TurntablePlan& plan) {
     std::string text = "      x1 (input)  x2 (output)    x3 (spin)   sphere  times\n";
     for (const TurntableRun& run : plan.runs) {
-        text += format("  %14.7g %12.7g %12.7g %8.4g %6zu\n", run.input[0], run.input[1],
-                       run.input[2], run.radius, run.count);
+        text += printed("  %14.7g %12.7g %12.7g %8.4g %6zu\n", run.input[0], run.input[1],
+                        run.input[2], run.radius, run.count);
     }
-    text += format("\n%zu runs, rank %zu of %zu\n", plan.run_count(), plan.evaluation.rank,
-                   plan.evaluation.coefficients);
+    text += printed("\n%zu runs, rank %zu of %zu\n", plan.run_count(), plan.evaluation.rank,
+                    plan.evaluation.coefficients);
     if (!plan.refusal.empty()) return text;
-    text += format("D-efficiency %.4f (at least %.4f by the equivalence bound)\n",
-                   plan.d_efficiency, plan.bound);
+    text += printed("D-efficiency %.4f (at least %.4f by the equivalence bound)\n",
+                    plan.d_efficiency, plan.bound);
     text += "optimum over the same spheres:";
     for (const auto& [sphere, share] : plan.optimal_shares)
-        text += format("  %.4f of the runs at %.4g", share, sphere);
+        text += printed("  %.4f of the runs at %.4g", share, sphere);
     text += "\nstandard errors for unit noise of a run:\n ";
     for (std::size_t k = 0; k < planning::kTerms; ++k) {
         if (plan.evaluation.sigma[k] != 0)
-            text += format(" %s %.3g", planning::kTermNames[k], plan.evaluation.sigma[k]);
+            text += printed(" %s %.3g", planning::kTermNames[k], plan.evaluation.sigma[k]);
     }
     text += '\n';
     if (!plan.growth.empty()) {
         text += "det M of the same runs on spheres 1 and r, decades:\n ";
-        for (const Growth& g : plan.growth) text += format(" r %g: %.2f", g.r, g.log10_det);
-        text += format("; for large r as r^%.0f\n", plan.growth_exponent);
+        for (const Growth& g : plan.growth) text += printed(" r %g: %.2f", g.r, g.log10_det);
+        text += printed("; for large r as r^%.0f\n", plan.growth_exponent);
         const auto& spheres = plan.request.spheres;
         if (spheres[1] / spheres[0] - 1 < kSameSphere) {
             text += "warning: spheres nearer than 5 % hardly tell D0 from the squares\n";
@@ -213,8 +214,8 @@ std::string turntable_csv(const TurntablePlan& plan) {
     std::size_t number = 1;
     for (const TurntableRun& run : plan.runs) {
         for (std::size_t k = 0; k < run.count; ++k) {
-            text += format("%zu,%.17g,%.17g,%.17g,\n", number++, run.input[0], run.input[1],
-                           run.input[2]);
+            text += printed("%zu,%.17g,%.17g,%.17g,\n", number++, run.input[0], run.input[1],
+                            run.input[2]);
         }
     }
     return text;
