@@ -1,11 +1,5 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Option.hpp>
-#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <charconv>
-#include <exception>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -52,49 +46,37 @@ CLI::Validator seconds() {
     return number_in(kShortestStep, kLongestStep, "seconds from 1e-9 to 1e9");
 }
 
-int run(Options& options) {
-    AllanAnalysis analysis;
-    try {
-        AllanRequest& request = options.request;
-        request.phase = options.data == "phase";
-        request.statistic = allan::statistic_named(options.type);
-        const std::map<std::string, allan::MeanMode> modes{
-            {"window-mean", allan::MeanMode::window_mean},
-            {"corrected", allan::MeanMode::corrected},
-            {"known-mean", allan::MeanMode::known_mean}};
-        request.mode = modes.at(options.mean);
-        if (request.mode == allan::MeanMode::known_mean && options.known_mean->count() == 0) {
+int run(const Options& options) {
+    AllanRequest request = options.request;
+    request.phase = options.data == "phase";
+    request.statistic = allan::statistic_named(options.type);
+    const std::map<std::string, allan::MeanMode> modes{
+        {"window-mean", allan::MeanMode::window_mean},
+        {"corrected", allan::MeanMode::corrected},
+        {"known-mean", allan::MeanMode::known_mean}};
+    request.mode = modes.at(options.mean);
+    if (request.mode == allan::MeanMode::known_mean && options.known_mean->count() == 0) {
+        throw std::runtime_error(
+            "--mean: known-mean found without --known-mean, expected the mean rate in deg/h");
+    }
+    if (!options.reference.empty()) {
+        allan::Terms terms{};
+        std::copy(options.reference.begin(), options.reference.end(), terms.begin());
+        if (std::all_of(terms.begin(), terms.end(), [](double t) { return t <= 0; })) {
             throw std::runtime_error(
-                "--mean: known-mean found without --known-mean, expected the mean rate in deg/h");
+                "--reference: five zeros found, expected at least one of Q,N,B,K,R above zero");
         }
-        if (!options.reference.empty()) {
-            allan::Terms terms{};
-            std::copy(options.reference.begin(), options.reference.end(), terms.begin());
-            if (std::all_of(terms.begin(), terms.end(), [](double t) { return t <= 0; })) {
-                throw std::runtime_error(
-                    "--reference: five zeros found, expected at least one of Q,N,B,K,R above zero");
-            }
-            request.reference = terms;
-        }
-        const std::map<std::string, allan::WindowShape> shapes{
-            {"rectangular", allan::WindowShape::rectangular},
-            {"hann", allan::WindowShape::hann},
-            {"exponential", allan::WindowShape::exponential}};
-        request.shape = shapes.at(options.shape);
-        if (options.live) return allan_live(request, options.json, options.plot) ? kAlarms : 0;
-        analysis = analyse(request);
-        if (!options.plot.empty()) {
-            allan_plot(analysis, options.plot);
-        }
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-        return kBadInput;
+        request.reference = terms;
     }
-    std::cout << (options.json ? allan_json(analysis) + "\n" : allan_table(analysis)) << std::flush;
-    if (!std::cout) {
-        std::cerr << "standard output: cannot be written\n";
-        return kBadInput;
-    }
+    const std::map<std::string, allan::WindowShape> shapes{
+        {"rectangular", allan::WindowShape::rectangular},
+        {"hann", allan::WindowShape::hann},
+        {"exponential", allan::WindowShape::exponential}};
+    request.shape = shapes.at(options.shape);
+    if (options.live) return allan_live(request, options.json, options.plot) ? kAlarms : 0;
+    const AllanAnalysis analysis = analyse(request);
+    if (!options.plot.empty()) allan_plot(analysis, options.plot);
+    std::cout << (options.json ? allan_json(analysis) + "\n" : allan_table(analysis));
     const bool alarms =
         std::any_of(analysis.windows.begin(), analysis.windows.end(),
                     [](const AllanWindow& w) { return w.row.refused || !w.alarms.empty(); });
@@ -138,47 +120,45 @@ void add_dynamic_options(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_allan(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<Options>();
-    AllanRequest& request = options->request;
-    CLI::App* command =
-        app.add_subcommand("allan", "Noise of a record: Allan and related deviations");
+    const auto [command, options] = add_command<Options>(
+        app, exit_code, "allan", "Noise of a record: Allan and related deviations", run);
+    AllanRequest& request = options.request;
     command
-        ->add_option("FILE", request.file,
-                     "numbers, one a line, or CSV; plain or gzip; - is standard input")
+        .add_option("FILE", request.file,
+                    "numbers, one a line, or CSV; plain or gzip; - is standard input")
         ->required();
-    command->add_option("--tau0", request.tau0, "s between samples; or give --time")
+    command.add_option("--tau0", request.tau0, "s between samples; or give --time")
         ->type_name("S")
         ->check(seconds());
-    command->add_option("--column", request.column, "name or number (from 1) of the column");
-    command->add_option("--time", request.time, "column with time stamps in s");
-    command->add_option("--data", options->data, "rate (default) or phase")
+    command.add_option("--column", request.column, "name or number (from 1) of the column");
+    command.add_option("--time", request.time, "column with time stamps in s");
+    command.add_option("--data", options.data, "rate (default) or phase")
         ->check(CLI::IsMember({"rate", "phase"}));
-    command->add_option("--unit", request.unit,
-                        "of the data: deg/h (default), deg/s, rad/s; phase: arcsec, deg, rad");
-    command->add_option("--type", options->type,
-                        "adev, oadev (default), mdev, hdev, ohdev, tdev, totdev");
-    command->add_option("--taus", request.taus, "octave (default), decade, all, or s: 1,10,100");
-    command->add_option("--confidence", request.confidence, "of the intervals (0.683)")
+    command.add_option("--unit", request.unit,
+                       "of the data: deg/h (default), deg/s, rad/s; phase: arcsec, deg, rad");
+    command.add_option("--type", options.type,
+                       "adev, oadev (default), mdev, hdev, ohdev, tdev, totdev");
+    command.add_option("--taus", request.taus, "octave (default), decade, all, or s: 1,10,100");
+    command.add_option("--confidence", request.confidence, "of the intervals (0.683)")
         ->check(number_in(0.01, 0.9999, "a number from 0.01 to 0.9999"));
-    command->add_flag("--fit", request.fit, "Q, N, B, K, R with errors");
-    command->add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
-    add_dynamic_options(*command, *options);
-    command->add_flag("--json", options->json, "print the result as JSON");
-    command->add_option(
-        "--plot", options->plot,
+    command.add_flag("--fit", request.fit, "Q, N, B, K, R with errors");
+    command.add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
+    add_dynamic_options(command, options);
+    command.add_flag("--json", options.json, "print the result as JSON");
+    command.add_option(
+        "--plot", options.plot,
         "an SVG file (with --dynamic the surface), or a folder for every chart; with "
         "--live an .html file of both charts, which loads itself again");
     // A window is printed and gone.
     for (const char* whole :
          {"--fit", "--taus", "--type", "--drop-outliers", "--column", "--time"}) {
-        command->get_option("--live")->excludes(command->get_option(whole));
+        command.get_option("--live")->excludes(command.get_option(whole));
     }
-    command->footer(
+    command.footer(
         "Example: vibrig allan gyro.csv.gz --column rate --tau0 0.01 --fit --plot gyro.svg\n"
         "         some-stream | vibrig allan - --tau0 0.025 --dynamic 600 --live --json\n"
         "dev has the data's unit (phase: per second; tdev: of the phase). Fit and windows: deg/h.\n"
         "Exit codes: 0 done, 1 a window was refused or raised an alarm, 2 bad usage or input.");
-    command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
 }  // namespace vibrig::tool

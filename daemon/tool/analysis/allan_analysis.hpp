@@ -73,6 +73,8 @@ struct AllanAnalysis {
 [[nodiscard]] allan::DynamicSettings dynamic_settings(const AllanRequest& request);
 
 [[nodiscard]] std::string allan_table(const AllanAnalysis& analysis);
+/// A line below the window that raised it.
+[[nodiscard]] std::string alarm_text(const allan::Alarm& alarm);
 [[nodiscard]] std::string allan_json(const AllanAnalysis& analysis);
 /// One window of the dynamic part, on one line.
 [[nodiscard]] std::string allan_window_json(const allan::WindowRow& row,

@@ -1,7 +1,5 @@
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <stdexcept>
@@ -9,6 +7,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/allan_analysis.hpp"
 #include "proto/text.hpp"
 
@@ -34,24 +33,15 @@ double live_sample(std::string_view line, std::size_t number) {
 }
 
 std::string live_text(const allan::WindowRow& row, const std::vector<allan::Alarm>& alarms) {
-    std::array<char, 160> line{};
-    std::snprintf(line.data(), line.size(), "%12.6g s  mean %13.6g deg/h", row.centre_s, row.mean);
-    std::string out = line.data();
+    std::string out = printed("%12.6g s  mean %13.6g deg/h", row.centre_s, row.mean);
     if (row.refused) return out + "  refused: samples are missing, or nothing varies";
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         const allan::FittedTerm& term = row.fit.terms[j];
-        if (!term.detected) continue;
-        std::snprintf(line.data(), line.size(), "  %s %.3g", allan::kTermNames[j], term.value);
-        out += line.data();
+        if (term.detected) out += printed("  %s %.3g", allan::kTermNames[j], term.value);
     }
     if (row.fit.slow.found && !row.fit.slow.determined) out += "  " + row.fit.verdict();
     for (const allan::Alarm& alarm : alarms) {
-        std::snprintf(line.data(), line.size(),
-                      "\n      alarm since %.6g s at tau %.4g s: ratio %.3g, "
-                      "limit %.3g; %s",
-                      alarm.since_s, alarm.tau, alarm.ratio, alarm.limit,
-                      allan::words_of(alarm.reading));
-        out += line.data();
+        out += "\n" + alarm_text(alarm);
     }
     return out;
 }

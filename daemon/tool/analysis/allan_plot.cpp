@@ -1,9 +1,7 @@
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <limits>
 
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/allan_analysis.hpp"
 
 namespace vibrig::tool {
@@ -31,34 +29,26 @@ std::string unit_of(const AllanAnalysis& analysis) {
     return request.phase ? unit + "/s" : unit;
 }
 
-std::string value_text(const char* name, const allan::FittedTerm& term, const char* unit) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "%s = %.3g %s", name, term.value, unit);
-    return text.data();
-}
-
 /// The model and the asymptote of each detected term, with the slope people look for.
 void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
     const double first = analysis.points.front().tau;
     const double last = analysis.points.back().tau;
     const allan::Terms terms = analysis.fit->values();
-    plot::Curve model{"fit", {}, {}, {}, {}, plot::Look::line};
+    plot::Curve model{"fit"};
     for (std::size_t i = 0; i < kModelPoints; ++i) {
         const double part = static_cast<double>(i) / static_cast<double>(kModelPoints - 1);
         const double tau = first * std::pow(last / first, part);
-        model.x.push_back(tau);
-        model.y.push_back(std::sqrt(allan::model_variance(terms, tau)) / analysis.to_deg_h);
+        model.add(tau, std::sqrt(allan::model_variance(terms, tau)) / analysis.to_deg_h);
     }
     chart.curves.push_back(model);
     if (analysis.fit->slow.found && !analysis.fit->slow.determined) {
-        plot::Curve slow{"slow noise", {}, {}, {}, {}, plot::Look::dashed};
+        plot::Curve slow{.name = "slow noise", .look = plot::Look::dashed};
         allan::Terms rest = terms;
         rest[static_cast<std::size_t>(allan::Term::Q)] = 0;
         rest[static_cast<std::size_t>(allan::Term::N)] = 0;
         for (std::size_t i = 0; i < model.x.size(); ++i) {
             const double y = std::sqrt(allan::model_variance(rest, model.x[i])) / analysis.to_deg_h;
-            slow.x.push_back(model.x[i]);
-            slow.y.push_back(y > 0.05 * model.y[i] ? y : kNaN);
+            slow.add(model.x[i], y > 0.05 * model.y[i] ? y : kNaN);
         }
         chart.curves.push_back(slow);
     }
@@ -68,13 +58,9 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
         if (!analysis.fit->terms[j].detected) {
             continue;
         }
-        plot::Curve term{
-            value_text(allan::kTermNames[j], analysis.fit->terms[j], allan::kTermUnits[j]),
-            {},
-            {},
-            {},
-            {},
-            plot::Look::dashed};
+        plot::Curve term{.name = printed("%s = %.3g %s", allan::kTermNames[j],
+                                         analysis.fit->terms[j].value, allan::kTermUnits[j]),
+                         .look = plot::Look::dashed};
         for (std::size_t i = 0; i < model.x.size(); ++i) {
             const double y =
                 terms[j] *
@@ -82,8 +68,7 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
                 analysis.to_deg_h;
             // Far below the curve a term says nothing and would stretch the axis.
             const bool near = y > 0.05 * model.y[i];
-            term.x.push_back(model.x[i]);
-            term.y.push_back(near ? y : kNaN);
+            term.add(model.x[i], near ? y : kNaN);
         }
         chart.curves.push_back(term);
     }
@@ -93,17 +78,14 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
 
 plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     const std::string name = upper(allan::name_of(analysis.request.statistic));
-    plot::Chart chart;
-    chart.title = name + " of " + std::filesystem::path(analysis.request.file).filename().string() +
-                  (analysis.column.empty() || analysis.column == "1" ? "" : ", " + analysis.column);
-    chart.x = plot::Axis("averaging time tau [s]", true);
-    chart.y = plot::Axis(name + " [" + unit_of(analysis) + "]", true);
-    plot::Curve measured{name, {}, {}, {}, {}, plot::Look::dots};
+    plot::Chart chart{
+        name + " of " + std::filesystem::path(analysis.request.file).filename().string() +
+            (analysis.column.empty() || analysis.column == "1" ? "" : ", " + analysis.column),
+        plot::Axis("averaging time tau [s]", true),
+        plot::Axis(name + " [" + unit_of(analysis) + "]", true)};
+    plot::Curve measured{.name = name, .look = plot::Look::dots};
     for (const allan::Point& p : analysis.points) {
-        measured.x.push_back(p.tau);
-        measured.y.push_back(p.dev);
-        measured.low.push_back(p.lo);
-        measured.high.push_back(p.hi);
+        measured.add(p.tau, p.dev, p.lo, p.hi);
     }
     constexpr std::size_t kMostDots = 100;
     if (measured.x.size() > kMostDots) {
@@ -139,11 +121,9 @@ std::vector<double> borders(const std::vector<double>& centres, bool log) {
 }  // namespace
 
 plot::Chart surface_chart(const AllanAnalysis& analysis) {
-    plot::Chart chart;
-    chart.title = "Dynamic Allan deviation of " +
-                  std::filesystem::path(analysis.request.file).filename().string();
-    chart.x = plot::Axis("time [s]", false);
-    chart.y = plot::Axis("averaging time tau [s]", true);
+    plot::Chart chart{"Dynamic Allan deviation of " +
+                          std::filesystem::path(analysis.request.file).filename().string(),
+                      plot::Axis("time [s]", false), plot::Axis("averaging time tau [s]", true)};
     plot::HeatMap map;
     map.label = "OADEV [deg/h]";
     map.log = true;
@@ -163,12 +143,11 @@ plot::Chart surface_chart(const AllanAnalysis& analysis) {
     map.x = borders(times, false);
     map.y = borders(taus, true);
     chart.maps.push_back(map);
-    plot::Curve alarmed{"", {}, {}, {}, {}, plot::Look::dots};
+    plot::Curve alarmed{.look = plot::Look::dots};
     for (const auto& [row, alarms] : analysis.windows) {
         for (const allan::Alarm& alarm : alarms) {
             if (alarm.reading != allan::Reading::mean_step) {
-                alarmed.x.push_back(row.centre_s);
-                alarmed.y.push_back(alarm.tau);
+                alarmed.add(row.centre_s, alarm.tau);
             }
         }
     }
@@ -180,22 +159,16 @@ plot::Chart surface_chart(const AllanAnalysis& analysis) {
 }
 
 plot::Chart traces_chart(const AllanAnalysis& analysis) {
-    plot::Chart chart;
-    chart.title = "Coefficients over time";
-    chart.x = plot::Axis("time [s]", false);
-    chart.y = plot::Axis("coefficient [its own unit]", true);
+    plot::Chart chart{"Coefficients over time", plot::Axis("time [s]", false),
+                      plot::Axis("coefficient [its own unit]", true)};
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
-        plot::Curve trace{std::string(allan::kTermNames[j]) + " [" + allan::kTermUnits[j] + "]",
-                          {},
-                          {},
-                          {},
-                          {},
-                          plot::Look::dots};
+        plot::Curve trace{
+            .name = std::string(allan::kTermNames[j]) + " [" + allan::kTermUnits[j] + "]",
+            .look = plot::Look::dots};
         for (const auto& [row, alarms] : analysis.windows) {
             const allan::FittedTerm& term = row.fit.terms[j];
             const bool there = !row.refused && term.detected;
-            trace.x.push_back(row.centre_s);
-            trace.y.push_back(there ? term.value : kNaN);
+            trace.add(row.centre_s, there ? term.value : kNaN);
             const bool bounded = there && term.sigma < term.value;
             trace.low.push_back(bounded ? term.value - term.sigma : kNaN);
             trace.high.push_back(bounded ? term.value + term.sigma : kNaN);
@@ -207,19 +180,12 @@ plot::Chart traces_chart(const AllanAnalysis& analysis) {
 }
 
 void allan_plot(const AllanAnalysis& analysis, const std::string& path) {
-    const std::filesystem::path where(path);
-    const bool dynamic = !analysis.windows.empty();
-    if (where.extension() == ".svg") {
-        plot::write_file(path,
-                         (dynamic ? surface_chart(analysis) : deviation_chart(analysis)).svg());
-        return;
-    }
-    plot::make_folder(path);
-    plot::write_file((where / "deviation.svg").string(), deviation_chart(analysis).svg());
-    if (dynamic) {
-        plot::write_file((where / "surface.svg").string(), surface_chart(analysis).svg());
-        plot::write_file((where / "coefficients.svg").string(), traces_chart(analysis).svg());
-    }
+    plot::Pictures pictures{{"deviation", deviation_chart(analysis).svg()}};
+    if (!analysis.windows.empty())
+        pictures = {{"surface", surface_chart(analysis).svg()},
+                    pictures.front(),
+                    {"coefficients", traces_chart(analysis).svg()}};
+    plot::write_pictures(path, pictures);
 }
 
 }  // namespace vibrig::tool

@@ -1,6 +1,4 @@
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/allan_analysis.hpp"
@@ -65,9 +63,7 @@ std::string windows_table(const AllanAnalysis& analysis) {
         }
         out += printed("  %zu\n", alarms.size());
         for (const allan::Alarm& alarm : alarms) {
-            out += printed("      alarm since %.6g s at tau %.4g s: ratio %.3g, limit %.3g; %s\n",
-                           alarm.since_s, alarm.tau, alarm.ratio, alarm.limit,
-                           allan::words_of(alarm.reading));
+            out += alarm_text(alarm) + "\n";
         }
     }
     return out;
@@ -110,6 +106,12 @@ std::string summary_table(const AllanAnalysis& analysis) {
 }
 
 }  // namespace
+
+std::string alarm_text(const allan::Alarm& alarm) {
+    return printed("      alarm since %.6g s at tau %.4g s: ratio %.3g, limit %.3g; %s",
+                   alarm.since_s, alarm.tau, alarm.ratio, alarm.limit,
+                   allan::words_of(alarm.reading));
+}
 
 std::string allan_table(const AllanAnalysis& analysis) {
     const AllanRequest& request = analysis.request;

@@ -1,14 +1,7 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <stdexcept>
@@ -17,6 +10,7 @@
 
 #include "daemon/plan/number_table.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/plan_terms.hpp"
 #include "estimator/allan/edf.hpp"
@@ -49,13 +43,6 @@ struct Study {
     double level = 0;
     [[nodiscard]] bool passed() const { return !result.test || result.test->probability >= level; }
 };
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-    std::array<char, 300> out{};
-    std::snprintf(out.data(), out.size(), pattern, values...);
-    return out.data();
-}
 
 void read(const Options& options, Study& study) {
     const auto table = plan::read_table(plan::content_of(options.file), options.file,
@@ -101,9 +88,9 @@ void warn_of_outliers(Study& study) {
         const double size = std::abs(study.result.standardised[i]);
         if (size > limit) {
             study.warnings.push_back(
-                format("line %zu: the output is %.3g standard deviations off the model, %.3g "
-                       "expected at most among so many",
-                       study.lines[i], size, limit));
+                printed("line %zu: the output is %.3g standard deviations off the model, %.3g "
+                        "expected at most among so many",
+                        study.lines[i], size, limit));
         }
     }
     if (!study.result.test) {
@@ -180,42 +167,37 @@ std::string table_text(const Study& study) {
         if (!study.terms[k]) continue;
         text +=
             std::isfinite(r.plan.sigma[k])
-                ? format("  %-5s %18.9g %14.3g\n", planning::kTermNames[k], r.value[k], r.sigma[k])
-                : format("  %-5s     not determined\n", planning::kTermNames[k]);
+                ? printed("  %-5s %18.9g %14.3g\n", planning::kTermNames[k], r.value[k], r.sigma[k])
+                : printed("  %-5s     not determined\n", planning::kTermNames[k]);
     }
-    text += format("\n%zu readings, rank %zu of %zu", study.readings.size(), r.plan.rank,
-                   r.plan.coefficients);
-    text += r.plan.identifies_all() ? format(", condition %.4g\n", r.plan.condition) : "\n";
-    if (std::isfinite(r.noise)) text += format("noise of a reading %.4g, 1 sigma\n", r.noise);
+    text += printed("\n%zu readings, rank %zu of %zu", study.readings.size(), r.plan.rank,
+                    r.plan.coefficients);
+    text += r.plan.identifies_all() ? printed(", condition %.4g\n", r.plan.condition) : "\n";
+    if (std::isfinite(r.noise)) text += printed("noise of a reading %.4g, 1 sigma\n", r.noise);
     if (r.test) {
         const planning::ResidualTest& t = *r.test;
         text += t.error_degrees == 0
-                    ? format("residuals: chi-square %.4g of %g", t.statistic, t.degrees)
-                    : format("lack of fit: F %.4g of %g and %g", t.statistic, t.degrees,
-                             t.error_degrees);
-        text += format(", probability %.3g: %s\n", t.probability,
-                       study.passed() ? "the model holds" : "the model does NOT hold");
+                    ? printed("residuals: chi-square %.4g of %g", t.statistic, t.degrees)
+                    : printed("lack of fit: F %.4g of %g and %g", t.statistic, t.degrees,
+                              t.error_degrees);
+        text += printed(", probability %.3g: %s\n", t.probability,
+                        study.passed() ? "the model holds" : "the model does NOT hold");
     }
     for (const std::string& warning : study.warnings) text += "warning: " + warning + '\n';
     return text;
 }
 
 plot::Chart residual_chart(const Study& study) {
-    plot::Chart chart;
-    chart.title = "Residuals of the calibration";
-    chart.x = plot::Axis("reading");
-    chart.y = plot::Axis("residual over its own sigma");
-    plot::Curve dots{"", {}, {}, {}, {}, plot::Look::dots};
+    plot::Chart chart{"Residuals of the calibration", plot::Axis("reading"),
+                      plot::Axis("residual over its own sigma")};
+    plot::Curve dots{.look = plot::Look::dots};
     for (std::size_t i = 0; i < study.readings.size(); ++i) {
-        dots.x.push_back(static_cast<double>(i + 1));
-        dots.y.push_back(study.result.standardised[i]);
+        dots.add(static_cast<double>(i + 1), study.result.standardised[i]);
     }
     chart.curves.push_back(dots);
     const double last = static_cast<double>(study.readings.size());
-    for (const double level : {-2.0, 2.0}) {
-        chart.curves.push_back(
-            {level > 0 ? "two sigma" : "", {1, last}, {level, level}, {}, {}, plot::Look::dashed});
-    }
+    for (const double level : {-2.0, 2.0})
+        chart.curves.push_back(plot::level_line(level > 0 ? "two sigma" : "", 1, last, level));
     return chart;
 }
 
@@ -230,14 +212,8 @@ int run(const Options& options) {
         throw std::runtime_error(options.file + ": " + error.what());
     }
     warn_of_outliers(study);
-    if (!options.plot.empty()) {
-        std::filesystem::path path(options.plot);
-        if (path.extension() != ".svg") {
-            plot::make_folder(options.plot);
-            path /= "residuals.svg";
-        }
-        plot::write_file(path.string(), residual_chart(study).svg());
-    }
+    if (!options.plot.empty())
+        plot::write_pictures(options.plot, {{"residuals", residual_chart(study).svg()}});
     std::cout << (options.json ? json_text(study) + "\n" : table_text(study));
     const bool complete = study.result.plan.identifies_all();
     if (!complete) {
@@ -258,31 +234,29 @@ int run(const Options& options) {
 namespace vibrig::tool {
 
 void add_calibrate(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<calibration::Options>();
-    CLI::App* command = app.add_subcommand(
-        "calibrate", "Ten coefficients of an accelerometer or gyro from a turntable test");
+    const auto [command, options] = add_command<calibration::Options>(
+        app, exit_code, "calibrate",
+        "Ten coefficients of an accelerometer or gyro from a turntable test", calibration::run);
     command
-        ->add_option("FILE", options->file,
-                     "CSV with x1, x2, x3 (input along input, output, spin axis: g, deg/s ...) and "
-                     "y (output); sigma (1 sigma of y) and count (readings that y is the mean of) "
-                     "if known")
+        .add_option("FILE", options.file,
+                    "CSV with x1, x2, x3 (input along input, output, spin axis: g, deg/s ...) and "
+                    "y (output); sigma (1 sigma of y) and count (readings that y is the mean of) "
+                    "if known")
         ->required();
-    command->add_option("--sigma", options->sigma, "1 sigma of one reading, if known")
+    command.add_option("--sigma", options.sigma, "1 sigma of one reading, if known")
         ->check(proto::finite(proto::kAboveZero));
-    command->add_option("--without", options->without, "terms the model has not, such as D12,D13")
+    command.add_option("--without", options.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
-    command->add_option("--level", options->level, "of the tests of the residuals (0.01)")
+    command.add_option("--level", options.level, "of the tests of the residuals (0.01)")
         ->check(proto::finite(1e-9, 0.5));
-    command->add_option("--plot", options->plot, "an SVG file, or a folder: the residuals");
-    command->add_flag("--json", options->json, "print the result as JSON");
-    command->footer(
+    command.add_option("--plot", options.plot, "an SVG file, or a folder: the residuals");
+    command.add_flag("--json", options.json, "print the result as JSON");
+    command.footer(
         "Example: vibrig calibrate turntable.csv --sigma 2e-6 --json\n"
         "The model: y = D0 + sum Di xi + sum Dii xi^2 + sum Dij xi xj. A plan for the test: vibrig "
         "plan --turntable.\n"
         "Exit codes: 0 done, 1 not all coefficients are determined or the model does not hold, 2 "
         "bad usage\nor input.");
-    command->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return calibration::run(*options); }); });
 }
 
 }  // namespace vibrig::tool

@@ -1,10 +1,5 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <exception>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -67,41 +62,41 @@ int run(const IdentifyOptions& options) {
 }  // namespace
 
 void add_identify(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<IdentifyOptions>();
-    CLI::App* command = app.add_subcommand(
-        "identify", "Gyro error coefficients from a recording (CSV, or HDF5 of vibrigd)");
+    const auto [command, options] = add_command<IdentifyOptions>(
+        app, exit_code, "identify",
+        "Gyro error coefficients from a recording (CSV, or HDF5 of vibrigd)", run);
     command
-        ->add_option("FILE", options->recording,
-                     "CSV with a header row and the columns time_s, run, position, alpha_deg, "
-                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a recorded "
-                     "campaign: its folder, HDF5 file or name")
+        .add_option("FILE", options.recording,
+                    "CSV with a header row and the columns time_s, run, position, alpha_deg, "
+                    "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a recorded "
+                    "campaign: its folder, HDF5 file or name")
         ->required();
-    command->add_option(
-        "--config", options->config,
+    command.add_option(
+        "--config", options.config,
         "configuration file (TOML); without it all defaults apply, of an HDF5 file its "
         "own");
     command
-        ->add_option("--instruction-set", options->instruction_set,
-                     "of the filter: auto (the best), or one of this processor's")
+        .add_option("--instruction-set", options.instruction_set,
+                    "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
-    command->add_option("--plot", options->plot,
-                        "an SVG file: uncertainties of the coefficients; or a folder: their "
-                        "correlation and the dwells' residuals, too");
-    command->add_flag("--json", options->json, "print the result as JSON");
+    command.add_option("--plot", options.plot,
+                       "an SVG file: uncertainties of the coefficients; or a folder: their "
+                       "correlation and the dwells' residuals, too");
+    command.add_flag("--json", options.json, "print the result as JSON");
     command
-        ->add_option(
-            "--spectrum", options->spectrum,
+        .add_option(
+            "--spectrum", options.spectrum,
             "quadratic coefficients over frequency, where a recording has several "
             "(columns frequency_hz, profile): flat, groups, resonance, or auto, which weighs them")
         ->check(CLI::IsMember({"auto", "flat", "groups", "resonance"}));
-    command->add_option(
-        "--spectra", options->spectra,
+    command.add_option(
+        "--spectra", options.spectra,
         "JSON list of {run, position, lines: [[hz, g_peak], ..]}, or in place of lines "
         "profile or psd, and level_db, for a recording without the columns");
-    command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
-    command->add_flag("--monte-carlo", options->monte_carlo,
-                      "draw the declared inputs (JCGM 101) to check the combined uncertainty");
-    command->footer(
+    command.add_flag("--strict", options.strict, "a doubtful result is a no as well");
+    command.add_flag("--monte-carlo", options.monte_carlo,
+                     "draw the declared inputs (JCGM 101) to check the combined uncertainty");
+    command.footer(
         "Example: vibrig identify recording.csv --config rig.toml --plot pictures --json > "
         "result.json\n"
         "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
@@ -109,8 +104,6 @@ void add_identify(CLI::App& app, int& exit_code) {
         "the keys suspected), or\ncoefficients are not observable (the result names them and the "
         "combinations that are "
         "determined),\nwith --strict also when it is doubtful; 2 bad usage or input.");
-    command->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });
 }
 
 }  // namespace vibrig::tool

@@ -1,7 +1,3 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <memory>
 #include <stdexcept>
 #include <vector>
@@ -39,8 +35,8 @@ levelling::LevellerSettings settings_of(const Options& options) {
 
 void check_samples(const char* option, double duration_s, double period_s) {
     if (duration_s / period_s > 2e7) {
-        throw std::invalid_argument(text("%s: %g s are %g samples, expected at most 2e7", option,
-                                         duration_s, duration_s / period_s));
+        throw std::invalid_argument(printed("%s: %g s are %g samples, expected at most 2e7", option,
+                                            duration_s, duration_s / period_s));
     }
 }
 
@@ -60,7 +56,7 @@ Json gains_json(const levelling::Gains& gains) {
 
 std::string budget_table(const levelling::Leveller& loop) {
     const levelling::NoiseBudget& budget = loop.budget();
-    return text(
+    return printed(
         "noise of the tilt, 1 sigma: reference %.4g', accelerometer %.4g', gyro %.4g'; "
         "together %.4g' (mostly %s); of the mean specific force %.4g'\n",
         budget.reference / kArcmin, budget.accelerometer / kArcmin, budget.gyro / kArcmin,
@@ -154,26 +150,22 @@ void add_level(CLI::App& app, int& exit_code) {
     CLI::App* command = app.add_subcommand("level", "The levelling loop: gains, simulated starts");
     command->require_subcommand(1);
     command->footer("Example: vibrig level simulate --tilt 30,-20 --plot tilt.svg");
-    auto options = std::make_shared<level_command::Options>();
-    CLI::App* design = command->add_subcommand(
-        "design", "Gains from settling time, residual and damping ratio; noise budget");
-    add_design_options(*design, *options);
-    design->footer(
+    const auto [design, to_design] = add_command<level_command::Options>(
+        *command, exit_code, "design",
+        "Gains from settling time, residual and damping ratio; noise budget", run_design);
+    add_design_options(design, to_design);
+    design.footer(
         "Example: vibrig level design --settling 600 --period 1 --reference-noise 0.2\n"
         "Method: Zha et al. 2019, eqs. 11-15.\n"
         "Exit codes: 0 done, 1 cannot settle with these figures, 2 bad usage or input.");
-    design->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run_design(*options); }); });
-    CLI::App* simulate =
-        command->add_subcommand("simulate", "Starts of two channels under the loop");
-    add_design_options(*simulate, *options);
-    add_simulate_options(*simulate, *options);
-    simulate->footer(
+    const auto [simulate, to_simulate] = add_command<level_command::Options>(
+        *command, exit_code, "simulate", "Starts of two channels under the loop", run_simulate);
+    add_design_options(simulate, to_simulate);
+    add_simulate_options(simulate, to_simulate);
+    simulate.footer(
         "Example: vibrig level simulate --tilt 30,30 --step 2 --window 10 --tolerance 0.2 --runs "
         "1000\n"
         "Exit codes: 0 settled, 1 not settled, 2 bad usage or input.");
-    simulate->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run_simulate(*options); }); });
 }
 
 }  // namespace vibrig::tool

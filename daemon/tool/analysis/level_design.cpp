@@ -13,30 +13,25 @@ namespace vibrig::tool::level_command {
 namespace {
 
 plot::Chart response_chart(const Options& options, const levelling::LevellerSettings& loop) {
-    plot::Chart chart;
-    chart.title = "Response to an initial tilt";
-    chart.x = plot::Axis("time [s]");
-    chart.y = plot::Axis("tilt / initial tilt");
+    plot::Chart chart{"Response to an initial tilt", plot::Axis("time [s]"),
+                      plot::Axis("tilt / initial tilt")};
     levelling::Scenario start;
     start.loop = loop;
     start.loop.noise = {};
     start.tilt = {kArcmin, 0};
     start.duration_s = 2 * loop.settling_s;
-    plot::Curve curve{"sampled loop", {}, {}, {}, {}, plot::Look::line};
+    plot::Curve curve{"sampled loop"};
     const auto run = levelling::simulate(start);
     const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 1000);
     for (std::size_t k = 0; k < run.trace.size(); k += every) {
-        curve.x.push_back(run.trace[k].time_s);
-        curve.y.push_back(run.trace[k].tilt[0] / kArcmin);
+        curve.add(run.trace[k].time_s, run.trace[k].tilt[0] / kArcmin);
     }
     chart.curves.push_back(curve);
     if (options.gains.empty()) {
-        plot::Curve exact{"eq. 15", {}, {}, {}, {}, plot::Look::dashed};
+        plot::Curve exact{.name = "eq. 15", .look = plot::Look::dashed};
         const double sigma = levelling::mean_decay(loop.fast);
         for (const double t : curve.x) {
-            exact.x.push_back(t);
-            exact.y.push_back(
-                levelling::initial_response(sigma * t, options.specification.damping));
+            exact.add(t, levelling::initial_response(sigma * t, options.specification.damping));
         }
         chart.curves.push_back(exact);
     }
@@ -92,26 +87,27 @@ int run_design(const Options& options) {
                          .dump()
                   << '\n';
     } else {
-        std::cout << text("K1 = %.6g 1/s, K2 = %.6g, K3 = %.6g 1/s\n", gains.k1, gains.k2, gains.k3)
-                  << text("sigma = %.5g 1/s", sigma);
+        std::cout << printed("K1 = %.6g 1/s, K2 = %.6g, K3 = %.6g 1/s\n", gains.k1, gains.k2,
+                             gains.k3)
+                  << printed("sigma = %.5g 1/s", sigma);
         for (const auto& root : roots) {
-            std::cout << text("; root %.5g %+.5gj", root.real(), root.imag());
+            std::cout << printed("; root %.5g %+.5gj", root.real(), root.imag());
         }
         std::cout
-            << text("\nRouth: K1 (1 + K2) = %.5g > K3 = %.5g\n", gains.k1 * (1 + gains.k2),
-                    gains.k3)
-            << text("sample period %.4g s, at most %.4g s\n", loop.period_s,
-                    levelling::kMostStep / sigma)
-            << text(
+            << printed("\nRouth: K1 (1 + K2) = %.5g > K3 = %.5g\n", gains.k1 * (1 + gains.k2),
+                       gains.k3)
+            << printed("sample period %.4g s, at most %.4g s\n", loop.period_s,
+                       levelling::kMostStep / sigma)
+            << printed(
                    "tolerance %.3g'; from tilts up to %.4g' and %.4g' with drifts up to %.4g and "
                    "%.4g deg/h ",
                    leveller.tolerance() / kArcmin, options.tilt[0], options.tilt[1],
                    options.drift[0], options.drift[1])
-            << (declared ? text("declared settled within %.4g s (one start in twenty at most is "
-                                "more than 5 %% late)\n",
-                                *declared)
-                         : text("not sure to be declared settled within %.4g s\n",
-                                levelling::kPatience * loop.settling_s))
+            << (declared ? printed("declared settled within %.4g s (one start in twenty at most is "
+                                   "more than 5 %% late)\n",
+                                   *declared)
+                         : printed("not sure to be declared settled within %.4g s\n",
+                                   levelling::kPatience * loop.settling_s))
             << budget_table(leveller);
         if (!leveller.message().empty()) {
             std::cout << "note: " << leveller.message() << '\n';

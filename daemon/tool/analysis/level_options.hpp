@@ -1,13 +1,12 @@
 #pragma once
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/results/text_line.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace vibrig::tool::level_command {
@@ -46,13 +45,6 @@ struct Options {
     std::uint64_t seed = 1;
     std::size_t runs = 1;
 };
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 400> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
 
 inline Pair pair(const std::vector<double>& list, double unit) {
     return {list[0] * unit, list[1] * unit};

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <random>
 #include <stdexcept>
@@ -32,7 +31,7 @@ levelling::Scenario scenario_of(const Options& options) {
         options.duration_s > 0 ? options.duration_s : 3.1 * options.specification.settling_s;
     check_samples("--duration", start.duration_s, options.period_s);
     if (options.step != 0 && options.step_s < 0 && options.runs == 1) {
-        throw std::invalid_argument(text(
+        throw std::invalid_argument(printed(
             "--step: found %g without --step-at, expected the time of the step", options.step));
     }
     start.seed = options.seed;
@@ -40,36 +39,23 @@ levelling::Scenario scenario_of(const Options& options) {
 }
 
 void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
-    plot::Chart tilt;
-    tilt.title = "Tilt while levelling";
-    tilt.x = plot::Axis("time [s]");
-    tilt.y = plot::Axis("tilt [arcmin]");
-    plot::Chart rate;
-    rate.title = "Commanded rate while levelling";
-    rate.x = plot::Axis("time [s]");
-    rate.y = plot::Axis("rate [deg/h]");
+    plot::Chart tilt{"Tilt while levelling", plot::Axis("time [s]"), plot::Axis("tilt [arcmin]")};
+    plot::Chart rate{"Commanded rate while levelling", plot::Axis("time [s]"),
+                     plot::Axis("rate [deg/h]")};
     const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 2000);
     for (std::size_t i = 0; i < 2; ++i) {
         const char* name = i == 0 ? "first channel" : "second channel";
-        plot::Curve of_tilt{name, {}, {}, {}, {}, plot::Look::line};
-        plot::Curve of_rate{name, {}, {}, {}, {}, plot::Look::line};
+        plot::Curve of_tilt{name};
+        plot::Curve of_rate{name};
         for (std::size_t k = 0; k < run.trace.size(); k += every) {
-            of_tilt.x.push_back(run.trace[k].time_s);
-            of_tilt.y.push_back(run.trace[k].tilt[i] / kArcmin);
+            of_tilt.add(run.trace[k].time_s, run.trace[k].tilt[i] / kArcmin);
             of_rate.y.push_back(run.trace[k].rate[i] / kDegPerHour);
         }
         of_rate.x = of_tilt.x;
         tilt.curves.push_back(std::move(of_tilt));
         rate.curves.push_back(std::move(of_rate));
     }
-    const std::filesystem::path where(path);
-    if (where.extension() == ".svg") {
-        plot::write_file(path, tilt.svg());
-        return;
-    }
-    plot::make_folder(path);
-    plot::write_file((where / "tilt.svg").string(), tilt.svg());
-    plot::write_file((where / "rate.svg").string(), rate.svg());
+    plot::write_pictures(path, {{"tilt", tilt.svg()}, {"rate", rate.svg()}});
 }
 
 /// What became of many starts.
@@ -149,11 +135,11 @@ int run_many(const Options& options) {
                          .dump()
                   << '\n';
     } else {
-        std::cout << text(
+        std::cout << printed(
                          "%zu of %zu settled, %zu later than %.5g s after the start or the step, "
                          "%zu declared falsely\n",
                          many.times.size(), options.runs, many.late, many.bound, many.falsely)
-                  << text(
+                  << printed(
                          "time: median %.5g s, 95 %% within %.5g s, longest %.5g s; largest tilt "
                          "when declared %.3g' (tolerance %.3g')\n",
                          many.time_within(0.5), many.time_within(0.95), many.time_within(1),
@@ -197,14 +183,14 @@ int run_simulate(const Options& options) {
         }
         std::cout << result.dump() << '\n';
     } else {
-        std::cout << text("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
-                          end[0] / kArcmin, end[1] / kArcmin);
+        std::cout << printed("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
+                             end[0] / kArcmin, end[1] / kArcmin);
         if (fast) {
-            std::cout << (run.settled_s >= 0 ? text("settled after %.5g s", run.settled_s)
+            std::cout << (run.settled_s >= 0 ? printed("settled after %.5g s", run.settled_s)
                                              : std::string(levelling::name_of(run.verdict)))
-                      << text("; tolerance %.3g'\n", leveller.tolerance() / kArcmin)
-                      << text("drift found: %.5g and %.5g deg/h\n", run.drift[0] / kDegPerHour,
-                              run.drift[1] / kDegPerHour)
+                      << printed("; tolerance %.3g'\n", leveller.tolerance() / kArcmin)
+                      << printed("drift found: %.5g and %.5g deg/h\n", run.drift[0] / kDegPerHour,
+                                 run.drift[1] / kDegPerHour)
                       << budget_table(leveller);
             if (!run.message.empty()) {
                 std::cout << "note: " << run.message << '\n';

@@ -1,13 +1,7 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -16,6 +10,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/results/spectrum_json.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
@@ -40,13 +35,6 @@ struct PredictOptions {
     std::optional<double> elastic_beyond, tolerance;
     bool same_accelerometers = false, json = false, list = false, force = false;
 };
-
-template <class... Values>
-std::string row_text(const char* format, Values... values) {
-    std::array<char, 300> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return std::string(text.data()) + "\n";
-}
 
 /// Dwells under the profile: what they showed, and where.
 struct Held {
@@ -182,7 +170,7 @@ PredictionJson attitudes_json(const Prediction& of, const std::vector<std::array
 /// "gyro y at (30, 10, -20)": the worst of a verification.
 std::string worst_text(const Verification& of, const Held& held) {
     const auto& deg = held.deg[static_cast<std::size_t>(of.dwell)];
-    return row_text(
+    return line(
         "largest z %.1f, gyro %c at (%.1f, %.1f, %.1f): \"%s\" would have to be %.1f "
         "times as large",
         of.largest_z, "xyz"[of.gyro], deg[0], deg[1], deg[2], of.part.c_str(), of.larger);
@@ -227,26 +215,26 @@ std::string predicted_json(const Predicted& of) {
 
 std::string predicted_text(const Predicted& of) {
     std::string text =
-        row_text("%s: %.4g g rms", of.profile.name.c_str(), std::sqrt(mean_square(of.profile)));
+        line("%s: %.4g g rms", of.profile.name.c_str(), std::sqrt(mean_square(of.profile)));
     if (!of.refusal.empty()) text += "FORCED: " + of.refusal + "\n";
     if (!of.note.empty()) text += "Note: " + of.note + "\n";
-    text += row_text("%-24s %-4s %12s %10s   %s", "attitude, deg", "gyro", "drift deg/h", "u",
-                     "of it coefficients, resonance, gain, realisation, outside");
+    text += line("%-24s %-4s %12s %10s   %s", "attitude, deg", "gyro", "drift deg/h", "u",
+                 "of it coefficients, resonance, gain, realisation, outside");
     for (std::size_t k = 0; k < of.deg.size(); ++k) {
         const auto row = static_cast<Index>(k);
         const Prediction& p = of.prediction;
         for (Index j = 0; j < 3; ++j)
-            text += row_text("(%6.1f, %6.1f, %6.1f) %-4c %12.6f %10.6f   %.6f %.6f %.6f %.6f %.6f",
-                             of.deg[k][0], of.deg[k][1], of.deg[k][2], "xyz"[j], p.drift(row, j),
-                             p.u(row, j), p.coefficients(row, j), p.resonance(row, j),
-                             p.gain(row, j), p.realisation(row, j), p.outside(row, j));
+            text += line("(%6.1f, %6.1f, %6.1f) %-4c %12.6f %10.6f   %.6f %.6f %.6f %.6f %.6f",
+                         of.deg[k][0], of.deg[k][1], of.deg[k][2], "xyz"[j], p.drift(row, j),
+                         p.u(row, j), p.coefficients(row, j), p.resonance(row, j), p.gain(row, j),
+                         p.realisation(row, j), p.outside(row, j));
     }
-    text += row_text("%.1f %% of the profile's power lies outside what was measured: %s",
-                     100 * of.prediction.power_outside, of.covered() ? "covered" : "NOT COVERED");
+    text += line("%.1f %% of the profile's power lies outside what was measured: %s",
+                 100 * of.prediction.power_outside, of.covered() ? "covered" : "NOT COVERED");
     if (of.verification) {
         const Verification& v = *of.verification;
-        text += row_text("held-out dwells: chi-square %.1f of %d, p = %.2g: %s", v.chi_square,
-                         v.degrees, v.p, word_of(v));
+        text += line("held-out dwells: chi-square %.1f of %d, p = %.2g: %s", v.chi_square,
+                     v.degrees, v.p, word_of(v));
         if (!v.confirmed) text += worst_text(v, of.held);
     }
     return text;
@@ -255,9 +243,9 @@ std::string predicted_text(const Predicted& of) {
 std::string profiles_text() {
     std::string text;
     for (const Profile& profile : built_in_profiles()) {
-        text += row_text("%s: %.2f g rms", profile.name.c_str(), std::sqrt(mean_square(profile)));
+        text += line("%s: %.2f g rms", profile.name.c_str(), std::sqrt(mean_square(profile)));
         for (const auto& [hz, density] : profile.psd)
-            text += row_text("    %6g Hz %10g g^2/Hz", hz, density);
+            text += line("    %6g Hz %10g g^2/Hz", hz, density);
     }
     return text + "Examples of the types, not a standard's text.\n";
 }
@@ -334,48 +322,46 @@ int run_predict(const PredictOptions& options) {
 }  // namespace
 
 void add_predict(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<PredictOptions>();
-    CLI::App* command = app.add_subcommand(
-        "predict", "Drift under a vibration profile, with its uncertainty, and held-out dwells");
-    command->add_option("RESULT", options->result, "JSON of vibrig identify --json");
-    command->add_option("--profile", options->profile,
-                        "JSON file {psd: [[hz, g2_hz], ..] or {north, up, east}, cross: {north_up, "
-                        "..}, sines: [[hz, g_peak], ..], direction, g_rms, at}, a name of --list, "
-                        "or of a [[profile]] of the configuration");
+    const auto [command, options] = add_command<PredictOptions>(
+        app, exit_code, "predict",
+        "Drift under a vibration profile, with its uncertainty, and held-out dwells", run_predict);
+    command.add_option("RESULT", options.result, "JSON of vibrig identify --json");
+    command.add_option("--profile", options.profile,
+                       "JSON file {psd: [[hz, g2_hz], ..] or {north, up, east}, cross: {north_up, "
+                       "..}, sines: [[hz, g_peak], ..], direction, g_rms, at}, a name of --list, "
+                       "or of a [[profile]] of the configuration");
     command
-        ->add_option("--attitude", options->attitudes,
-                     "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")
+        .add_option("--attitude", options.attitudes,
+                    "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")
         ->allow_extra_args(false);
-    command->add_option("--at", options->at, "where the profile holds: platform, or table (pads)")
+    command.add_option("--at", options.at, "where the profile holds: platform, or table (pads)")
         ->check(CLI::IsMember({"platform", "table"}));
     command
-        ->add_option("--seconds", options->seconds,
-                     "mean over so long: what a random vibration's realisation varies is added")
+        .add_option("--seconds", options.seconds,
+                    "mean over so long: what a random vibration's realisation varies is added")
         ->check(proto::finite(proto::kAboveZero, 1e7));
-    command->add_option("--verify", options->recording,
-                        "recording of dwells under the profile that were not in the fit");
+    command.add_option("--verify", options.recording,
+                       "recording of dwells under the profile that were not in the fit");
     command
-        ->add_option("--tolerance", options->tolerance,
-                     "deg/h that two standard deviations stay below in a tight test "
-                     "(spectrum.tolerance_deg_h)")
+        .add_option("--tolerance", options.tolerance,
+                    "deg/h that two standard deviations stay below in a tight test "
+                    "(spectrum.tolerance_deg_h)")
         ->check(proto::finite(proto::kAboveZero, 1e3));
     command
-        ->add_option("--elastic-beyond", options->elastic_beyond,
-                     "elastic part allowed for beyond what was measured, of the static "
-                     "(spectrum.elastic_beyond)")
+        .add_option("--elastic-beyond", options.elastic_beyond,
+                    "elastic part allowed for beyond what was measured, of the static "
+                    "(spectrum.elastic_beyond)")
         ->check(proto::finite(0, 100));
-    command->add_flag("--same-accelerometers", options->same_accelerometers,
-                      "the profile was measured with the campaign's: their gain cancels");
-    command->add_option("--config", options->config, "configuration file (TOML) of the rig");
-    command->add_flag("--force", options->force, "print what is refused, marked");
-    command->add_flag("--json", options->json, "print the prediction as JSON");
-    command->add_flag("--list", options->list, "built-in profiles: examples of their types");
-    command->footer(
+    command.add_flag("--same-accelerometers", options.same_accelerometers,
+                     "the profile was measured with the campaign's: their gain cancels");
+    command.add_option("--config", options.config, "configuration file (TOML) of the rig");
+    command.add_flag("--force", options.force, "print what is refused, marked");
+    command.add_flag("--json", options.json, "print the prediction as JSON");
+    command.add_flag("--list", options.list, "built-in profiles: examples of their types");
+    command.footer(
         "Example: vibrig predict result.json --profile truck --attitude 45,0,90 --seconds 600\n"
         "Exit codes: 0 covered, and confirmed where it was verified; 1 not covered by what was "
         "measured,\nforced, or contradicted; 2 bad usage or input.");
-    command->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run_predict(*options); }); });
 }
 
 }  // namespace vibrig::tool

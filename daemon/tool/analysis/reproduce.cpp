@@ -2,10 +2,6 @@
 
 #include <unistd.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -217,16 +213,11 @@ int run(const std::string& name, const ReproduceOptions& options, bool as_json) 
                 std::cout << table(reproduction) << '\n' << std::flush;
             }
         } catch (const std::exception& error) {
-            std::cerr << "reproduce " << entry.name << ": " << error.what() << '\n';
-            return kBadInput;
+            throw std::runtime_error(std::string("reproduce ") + entry.name + ": " + error.what());
         }
     }
     if (as_json) {
-        std::cout << Json{{"reproductions", std::move(list)}}.dump() << '\n' << std::flush;
-    }
-    if (!std::cout) {
-        std::cerr << "standard output: cannot be written\n";
-        return kBadInput;
+        std::cout << Json{{"reproductions", std::move(list)}}.dump() << '\n';
     }
     return all_agree ? 0 : kDisagrees;
 }
@@ -260,16 +251,15 @@ void add_reproduce(CLI::App& app, int& exit_code) {
         "Example: vibrig reproduce tang2009 --seeds 32 --plot charts\n"
         "Exit codes: 0 everything agrees, 1 something differs (marked), 2 bad usage.");
     command->callback([options, plot, &exit_code] {
-        if (plot->count() > 0) {
-            try {
-                check_plot(options->reproduce.plot);
-            } catch (const std::exception& error) {
-                std::cerr << "reproduce: " << error.what() << '\n';
-                exit_code = kBadInput;
-                return;
-            }
-        }
-        exit_code = run(options->name, options->reproduce, options->json);
+        exit_code = guarded(
+            [&] {
+                if (plot->count() > 0) check_plot(options->reproduce.plot);
+                return 0;
+            },
+            "reproduce: ");
+        if (exit_code == 0)
+            exit_code =
+                guarded([&] { return run(options->name, options->reproduce, options->json); });
     });
 }
 

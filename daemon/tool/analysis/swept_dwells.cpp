@@ -1,10 +1,9 @@
 #include "daemon/tool/analysis/swept_dwells.hpp"
 
-#include <array>
-#include <cstdio>
 #include <numbers>
 #include <stdexcept>
 
+#include "daemon/results/text_line.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
 
 namespace vibrig::tool {
@@ -22,13 +21,6 @@ std::string place(const std::string& file, const proto::RecordingRow& row) {
     return file + ":" + std::to_string(row.line) + ": column frequency_hz: ";
 }
 
-template <class... Values>
-std::string words(const char* format, Values... values) {
-    std::array<char, 240> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
-}
-
 void expect_one_way(const Rows& dwell, const std::string& file) {
     const double first = dwell.front()->frequency_hz;
     const bool rises = dwell.back()->frequency_hz > first;
@@ -37,9 +29,9 @@ void expect_one_way(const Rows& dwell, const std::string& file) {
         const double hz = row->frequency_hz;
         if (!(hz > 0) || (rises ? hz < before : hz > before))
             throw std::runtime_error(place(file, *row) +
-                                     words("found %g after %g, expected a sweep that %s all the "
-                                           "time, or one frequency in a dwell",
-                                           hz, before, rises ? "rises" : "falls"));
+                                     printed("found %g after %g, expected a sweep that %s all the "
+                                             "time, or one frequency in a dwell",
+                                             hz, before, rises ? "rises" : "falls"));
         before = hz;
     }
 }
@@ -70,16 +62,17 @@ spectrum::Sweep sweep_of(const estimator::Settings& settings, const Rows& dwell,
     if (const double shown = blocks.shown(); shown < spectrum::SweepBlocks::kShown)
         throw std::runtime_error(
             place(file, *dwell.front()) +
-            words("found a sweep of which the accelerometers show %.2f of their power, expected "
-                  "%g at least: they vibrate at other frequencies",
-                  shown, spectrum::SweepBlocks::kShown));
+            printed("found a sweep of which the accelerometers show %.2f of their power, expected "
+                    "%g at least: they vibrate at other frequencies",
+                    shown, spectrum::SweepBlocks::kShown));
     if (sweep.known() < kFewestBlocks)
         throw std::runtime_error(
             place(file, *dwell.front()) +
-            words("found a sweep with %zu seconds of %zu that can be used, expected %zu at least: "
-                  "in others a harmonic falls on a multiple of the sampling rate, or "
-                  "accelerometers or angles are missing",
-                  sweep.known(), sweep.blocks.size(), kFewestBlocks));
+            printed(
+                "found a sweep with %zu seconds of %zu that can be used, expected %zu at least: "
+                "in others a harmonic falls on a multiple of the sampling rate, or "
+                "accelerometers or angles are missing",
+                sweep.known(), sweep.blocks.size(), kFewestBlocks));
     return sweep;
 }
 

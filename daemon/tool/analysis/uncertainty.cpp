@@ -1,12 +1,7 @@
 // vibrig uncertainty: the budget of a result, and what would shrink it.
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -89,8 +84,8 @@ void draw_budget(const uncertainty::Assessment& assessed, const std::string& pat
             double square = 0;
             for (const auto& part : c.budget)
                 square += part.input == of.input ? part.contribution * part.contribution : 0;
-            curve.x.push_back(static_cast<double>(i + 1));
-            curve.y.push_back(c.u > 0 ? square / (c.u * c.u) : uncertainty::kNone);
+            curve.add(static_cast<double>(i + 1),
+                      c.u > 0 ? square / (c.u * c.u) : uncertainty::kNone);
         }
         chart.curves.push_back(std::move(curve));
         if (chart.curves.size() == 6) break;
@@ -121,31 +116,29 @@ int run(const UncertaintyOptions& options) {
 }  // namespace
 
 void add_uncertainty(CLI::App& app, int& exit_code) {
-    auto options = std::make_shared<UncertaintyOptions>();
-    CLI::App* command = app.add_subcommand(
-        "uncertainty", "The uncertainty budget of a result, and what would shrink it most");
+    const auto [command, options] = add_command<UncertaintyOptions>(
+        app, exit_code, "uncertainty",
+        "The uncertainty budget of a result, and what would shrink it most", run);
     command
-        ->add_option("FILE", options->file,
-                     "a recording (CSV), or a campaign: its folder, HDF5 file or name")
+        .add_option("FILE", options.file,
+                    "a recording (CSV), or a campaign: its folder, HDF5 file or name")
         ->required();
-    command->add_option("--config", options->config,
-                        "configuration file (TOML) with [uncertainty] and [drift]; without it all "
-                        "defaults apply, of a campaign its own");
-    command->add_option("--coefficient", options->coefficient,
-                        "the whole budget of this one only, such as D_IIx");
-    command->add_option("--plot", options->plot, "draw the parts of the budget: an SVG file");
-    command->add_flag("--monte-carlo", options->monte_carlo,
-                      "check the combined uncertainty by drawing the inputs (JCGM 101)");
-    command->add_flag("--json", options->json, "print everything as JSON");
-    command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
-    command->footer(
+    command.add_option("--config", options.config,
+                       "configuration file (TOML) with [uncertainty] and [drift]; without it all "
+                       "defaults apply, of a campaign its own");
+    command.add_option("--coefficient", options.coefficient,
+                       "the whole budget of this one only, such as D_IIx");
+    command.add_option("--plot", options.plot, "draw the parts of the budget: an SVG file");
+    command.add_flag("--monte-carlo", options.monte_carlo,
+                     "check the combined uncertainty by drawing the inputs (JCGM 101)");
+    command.add_flag("--json", options.json, "print everything as JSON");
+    command.add_flag("--strict", options.strict, "a doubtful result is a no as well");
+    command.footer(
         "Example: vibrig uncertainty platform-17-20260301T080000Z --monte-carlo\n"
         "Inputs are declared in [uncertainty]; what is not declared stands at its default and is "
         "marked.\n"
         "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
         "doubtful),\n2 bad usage or input.");
-    command->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });
 }
 
 }  // namespace vibrig::tool

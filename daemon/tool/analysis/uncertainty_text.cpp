@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <vector>
+
+#include "daemon/results/text_line.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -13,13 +14,6 @@ using namespace estimator::uncertainty;
 
 /// Parts told of each coefficient, and pieces of advice.
 constexpr std::size_t kPartsTold = 3, kAdviceTold = 3;
-
-template <class... Values>
-std::string filled_line(const char* format, Values... values) {
-    std::array<char, 400> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return std::string(text.data()) + "\n";
-}
 
 /// Elements of one input together.
 std::vector<Contribution> joined_parts(const std::vector<Contribution>& parts) {
@@ -40,12 +34,12 @@ std::vector<Contribution> joined_parts(const std::vector<Contribution>& parts) {
 }
 
 std::string of_all(const Assessment& assessed) {
-    std::string text = filled_line("%-12s %11s %10s %10s %6s  %s", "coefficient", "value", "u", "U",
-                                   "k", "largest parts of u");
+    std::string text = line("%-12s %11s %10s %10s %6s  %s", "coefficient", "value", "u", "U", "k",
+                            "largest parts of u");
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const Coefficient& c = assessed.coefficients[i];
         if (!(c.u > 0)) {
-            text += filled_line("%-12s not determined", estimator::parameter_names()[i]);
+            text += line("%-12s not determined", estimator::parameter_names()[i]);
             continue;
         }
         std::string parts;
@@ -53,11 +47,11 @@ std::string of_all(const Assessment& assessed) {
             if (std::count(parts.begin(), parts.end(), ';') + 1 > static_cast<long>(kPartsTold))
                 break;
             parts += part.input + (part.declared ? " " : " (not declared) ") +
-                     filled_line("%.2g;", part.contribution);
+                     line("%.2g;", part.contribution);
             parts.back() = ' ';
         }
-        text += filled_line("%-12s %11.6f %10.6f %10.6f %6.2f  %s", estimator::parameter_names()[i],
-                            c.value, c.u, c.expanded, c.k, parts.c_str());
+        text += line("%-12s %11.6f %10.6f %10.6f %6.2f  %s", estimator::parameter_names()[i],
+                     c.value, c.u, c.expanded, c.k, parts.c_str());
     }
     return text;
 }
@@ -65,16 +59,14 @@ std::string of_all(const Assessment& assessed) {
 std::string of_one(const Assessment& assessed, std::size_t i) {
     const Coefficient& c = assessed.coefficients[i];
     const char* unit = estimator::parameter_unit(i);
-    if (!(c.u > 0)) return filled_line("%s: not determined", estimator::parameter_names()[i]);
-    std::string text =
-        filled_line("%s = %.6f, u %.6f, U %.6f %s (k %.2f)", estimator::parameter_names()[i],
-                    c.value, c.u, c.expanded, unit, c.k);
-    text +=
-        filled_line("%-24s %-28s %11s %11s %12s  %s", "input", "", "u of it", "c", "part of u", "");
+    if (!(c.u > 0)) return line("%s: not determined", estimator::parameter_names()[i]);
+    std::string text = line("%s = %.6f, u %.6f, U %.6f %s (k %.2f)",
+                            estimator::parameter_names()[i], c.value, c.u, c.expanded, unit, c.k);
+    text += line("%-24s %-28s %11s %11s %12s  %s", "input", "", "u of it", "c", "part of u", "");
     for (const Contribution& part : c.budget)
-        text += filled_line("%-24s %-28s %11.3g %11.3g %12.3g  %s", part.input.c_str(),
-                            part.element.c_str(), part.u, part.sensitivity, part.contribution,
-                            part.declared ? "" : "not declared");
+        text +=
+            line("%-24s %-28s %11.3g %11.3g %12.3g  %s", part.input.c_str(), part.element.c_str(),
+                 part.u, part.sensitivity, part.contribution, part.declared ? "" : "not declared");
     return text;
 }
 
@@ -104,8 +96,8 @@ std::string budget_table(const Assessment& assessed, std::optional<std::size_t> 
 
 std::string allowance_table(const Assessment& assessed) {
     constexpr std::array<const char*, kKinds> kUnits{"deg/h", "deg/h/g", "deg/h/g^2", "deg/h/g^2"};
-    std::string text = filled_line("With the declared inputs, medians:\n%-14s %10s %10s %10s  %s",
-                                   "", "sigma", "u", "U", "unit");
+    std::string text = line("With the declared inputs, medians:\n%-14s %10s %10s %10s  %s", "",
+                            "sigma", "u", "U", "unit");
     for (std::size_t k = 0; k < kKinds; ++k) {
         std::array<std::vector<double>, 3> values;
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
@@ -115,8 +107,8 @@ std::string allowance_table(const Assessment& assessed) {
             values[1].push_back(c.u);
             values[2].push_back(c.expanded);
         }
-        text += filled_line("%-14s %10.5f %10.5f %10.5f  %s", kind_name(k), middle_of(values[0]),
-                            middle_of(values[1]), middle_of(values[2]), kUnits[k]);
+        text += line("%-14s %10.5f %10.5f %10.5f  %s", kind_name(k), middle_of(values[0]),
+                     middle_of(values[1]), middle_of(values[2]), kUnits[k]);
     }
     return text + advices(assessed);
 }

@@ -1,7 +1,3 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -13,7 +9,6 @@
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
-#include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/column_file.hpp"

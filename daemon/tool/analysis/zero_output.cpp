@@ -30,18 +30,14 @@ Share share_of(std::size_t i, std::size_t k) {
 }  // namespace
 
 plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace) {
-    plot::Chart chart;
-    chart.title = "Accelerometer zeros while the azimuth turns";
-    chart.x = plot::Axis("time [s]");
-    chart.y = plot::Axis("zero [mg]");
+    plot::Chart chart{"Accelerometer zeros while the azimuth turns", plot::Axis("time [s]"),
+                      plot::Axis("zero [mg]")};
     for (std::size_t i = 0; i < 3; ++i) {
-        plot::Curve curve{kAxisLetters[i], {}, {}, {}, {}, plot::Look::line};
+        plot::Curve curve{kAxisLetters[i]};
         for (const zeros::CalibrationTrace& point : trace) {
             if (point.sigma_mg[i] > 2) continue;  // the first guesses would stretch the axis
-            curve.x.push_back(point.time_s);
-            curve.y.push_back(point.zero_mg[i]);
-            curve.low.push_back(point.zero_mg[i] - point.sigma_mg[i]);
-            curve.high.push_back(point.zero_mg[i] + point.sigma_mg[i]);
+            curve.add(point.time_s, point.zero_mg[i], point.zero_mg[i] - point.sigma_mg[i],
+                      point.zero_mg[i] + point.sigma_mg[i]);
         }
         chart.curves.push_back(curve);
     }
