@@ -1,12 +1,14 @@
 #include "daemon/plot/chart.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -49,14 +51,14 @@ constexpr Palette kDark{
 
 // Plain rules: many viewers know no CSS variables.
 std::string rules(const Palette& palette) {
-    std::string css = std::string(".paper{fill:") + palette.paper + "}text{fill:" + palette.ink +
-                      "}.grid{stroke:" + palette.grid + "}.fine{stroke:" + palette.fine +
-                      "}.frame{stroke:" + palette.ink + "}\n";
-    for (std::size_t i = 0; i < kColours; ++i) {
-        const std::string c = ".c" + std::to_string(i);
-        css += c + " .line," + c + " .dashed," + c + " .bar{stroke:" + palette.curves[i] + "}" + c +
-               " .dot," + c + " .band{fill:" + palette.curves[i] + "}\n";
-    }
+    std::string css = fmt::format(
+        ".paper{{fill:{}}}text{{fill:{}}}.grid{{stroke:{}}}.fine{{stroke:{}}}.frame{{stroke:{}}}\n",
+        palette.paper, palette.ink, palette.grid, palette.fine, palette.ink);
+    for (std::size_t i = 0; i < kColours; ++i)
+        css += fmt::format(
+            ".c{0} .line,.c{0} .dashed,.c{0} .bar{{stroke:{1}}}.c{0} .dot,.c{0} "
+            ".band{{fill:{1}}}\n",
+            i, palette.curves[i]);
     return css;
 }
 
@@ -66,12 +68,6 @@ std::string style() {
            ".frame{fill:none}.line,.dashed{fill:none;stroke-width:1.8}"
            ".dashed{stroke-width:1.4;stroke-dasharray:6 4}.band{fill-opacity:.16}\n" +
            rules(kLight) + "@media (prefers-color-scheme:dark){\n" + rules(kDark) + "}\n</style>\n";
-}
-
-std::string number(double value) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.2f", value);
-    return text.data();
 }
 
 /// Viridis, sampled; interpolated in between.
@@ -84,15 +80,12 @@ std::string colour(double part) {
                                                            {253, 231, 37}}};
     const double at = std::clamp(part, 0.0, 1.0) * (kScale.size() - 1);
     const auto i = std::min(static_cast<std::size_t>(at), kScale.size() - 2);
-    std::array<char, 8> text{};
-    std::array<int, 3> rgb{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        rgb[k] = static_cast<int>(std::lround(
-            kScale[i][k] + (at - static_cast<double>(i)) * (kScale[i + 1][k] - kScale[i][k])));
-    }
-    std::snprintf(text.data(), text.size(), "#%02x%02x%02x", static_cast<unsigned>(rgb[0]) & 255U,
-                  static_cast<unsigned>(rgb[1]) & 255U, static_cast<unsigned>(rgb[2]) & 255U);
-    return text.data();
+    std::string text = "#";
+    for (std::size_t k = 0; k < 3; ++k)
+        text += fmt::format("{:02x}",
+                            std::lround(kScale[i][k] + (at - static_cast<double>(i)) *
+                                                           (kScale[i + 1][k] - kScale[i][k])));
+    return text;
 }
 
 class Drawing {
@@ -128,7 +121,8 @@ class Drawing {
             if (x_.named.empty()) {
                 text(px(t), bottom() + 18, x_.text_of(t), "middle");
             } else {
-                upright(px(t) + 4, bottom() + 8, x_.text_of(t));
+                // Names side by side would run into each other.
+                upright(px(t) + 4, bottom() + 8, x_.text_of(t), "end");
             }
         }
         for (const double t : y_.ticks()) {
@@ -138,21 +132,21 @@ class Drawing {
     }
 
     void frame(const std::string& title) {
-        out_ += "<rect class=\"frame\" x=\"" + number(kLeft) + "\" y=\"" + number(kTop) +
-                "\" width=\"" + number(right() - kLeft) + "\" height=\"" + number(kPlotHeight) +
-                "\"/>\n";
+        add("<rect class=\"frame\" x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" "
+            "height=\"{:.2f}\"/>\n",
+            kLeft, kTop, right() - kLeft, kPlotHeight);
         text(kLeft, kTop - 16, title, "start", " class=\"title\"");
         text((kLeft + right()) / 2, bottom() + below() - 18, x_.label, "middle");
         const double middle = kTop + kPlotHeight / 2;
         text(22, middle, y_.label, "middle",
-             " transform=\"rotate(-90 22 " + number(middle) + ")\"");
+             fmt::format(" transform=\"rotate(-90 22 {:.2f})\"", middle));
     }
 
     /// A name of the legend that would not end within the picture is drawn in.
     static std::string fitted(const std::string& name) {
-        return name.size() <= kLegendLetters ? ""
-                                             : " lengthAdjust=\"spacingAndGlyphs\" textLength=\"" +
-                                                   number(kRight - 14 - 28 - 2) + '"';
+        if (name.size() <= kLegendLetters) return "";
+        return fmt::format(R"( lengthAdjust="spacingAndGlyphs" textLength="{:.2f}")",
+                           kRight - 14 - 28 - 2);
     }
 
     void curve(const Curve& curve, std::size_t index) {
@@ -204,16 +198,13 @@ class Drawing {
         for (const double t : scale.ticks()) {
             text(x + 24, bottom() - kPlotHeight * scale.place(t) + 4, scale.text_of(t), "start");
         }
-        const double at = x + 90;
-        const double middle = kTop + kPlotHeight / 2;
-        text(at, middle, map.label, "middle",
-             " transform=\"rotate(-90 " + number(at) + " " + number(middle) + ")\"");
+        upright(x + 90, kTop + kPlotHeight / 2, map.label, "middle");
     }
 
     void text(double x, double y, const std::string& words, const char* anchor,
               const std::string& more = "") {
-        out_ += "<text x=\"" + number(x) + "\" y=\"" + number(y) + "\" text-anchor=\"" + anchor +
-                "\"" + more + ">" + xml_text(words) + "</text>\n";
+        add("<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"{}\"{}>{}</text>\n", x, y, anchor, more,
+            xml_text(words));
     }
 
     [[nodiscard]] static double bottom() { return kTop + kPlotHeight; }
@@ -232,38 +223,37 @@ class Drawing {
         return std::isfinite(x) && std::isfinite(y) && !(x_.log && x <= 0) && !(y_.log && y <= 0);
     }
     [[nodiscard]] std::string at(double x, double y) const {
-        return number(px(x)) + " " + number(py(y));
+        return fmt::format("{:.2f} {:.2f}", px(x), py(y));
     }
 
-    void line(const char* style, double x1, double y1, double x2, double y2) {
-        out_ += std::string("<line class=\"") + style + "\" x1=\"" + number(x1) + "\" y1=\"" +
-                number(y1) + "\" x2=\"" + number(x2) + "\" y2=\"" + number(y2) + "\"/>\n";
+    template <class... Values>
+    void add(fmt::format_string<Values...> format, Values&&... values) {
+        fmt::format_to(std::back_inserter(out_), format, std::forward<Values>(values)...);
     }
-    /// Names side by side would run into each other.
-    void upright(double x, double y, const std::string& words) {
-        text(x, y, words, "end", " transform=\"rotate(-90 " + number(x) + " " + number(y) + ")\"");
+    void line(const char* style, double x1, double y1, double x2, double y2) {
+        add("<line class=\"{}\" x1=\"{:.2f}\" y1=\"{:.2f}\" x2=\"{:.2f}\" y2=\"{:.2f}\"/>\n", style,
+            x1, y1, x2, y2);
+    }
+    void upright(double x, double y, const std::string& words, const char* anchor) {
+        text(x, y, words, anchor, fmt::format(" transform=\"rotate(-90 {:.2f} {:.2f})\"", x, y));
     }
     void dot(double x, double y) {
-        out_ += "<circle class=\"dot\" cx=\"" + number(x) + "\" cy=\"" + number(y) + "\" r=\"3\"/>";
+        add(R"(<circle class="dot" cx="{:.2f}" cy="{:.2f}" r="3"/>)", x, y);
     }
     void cell(double x1, double y1, double x2, double y2, const std::string& fill) {
         // A little wider than the cell, or the paper shines through between neighbours.
-        out_ += "<rect x=\"" + number(x1) + "\" y=\"" + number(y1) + "\" width=\"" +
-                number(x2 - x1 + 0.3) + "\" height=\"" + number(y2 - y1 + 0.3) + "\" fill=\"" +
-                fill + "\"/>\n";
+        add("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+            x1, y1, x2 - x1 + 0.3, y2 - y1 + 0.3, fill);
     }
     void path(const Curve& curve) {
         std::string d;
         bool pen_down = false;
         for (std::size_t i = 0; i < curve.x.size(); ++i) {
             const bool draw = drawable(curve.x[i], curve.y[i]);
-            if (draw) {
-                d += (pen_down ? "L" : "M") + at(curve.x[i], curve.y[i]);
-            }
+            if (draw) d += (pen_down ? "L" : "M") + at(curve.x[i], curve.y[i]);
             pen_down = draw;
         }
-        out_ += std::string("<path clip-path=\"url(#plot)\" class=\"") + class_of(curve.look) +
-                "\" d=\"" + d + "\"/>";
+        add("<path clip-path=\"url(#plot)\" class=\"{}\" d=\"{}\"/>", class_of(curve.look), d);
     }
     void band(const Curve& curve) {
         std::string there;
@@ -310,13 +300,15 @@ std::string Chart::svg() const {
         drawing.text(kLeft, foot + 2 + kNoteHeight * static_cast<double>(i), notes[i], "start",
                      " class=\"note\"");
     }
-    return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number(kWidth) + "\" height=\"" +
-           number(height) + "\" viewBox=\"0 0 " + number(kWidth) + " " + number(height) +
-           "\" role=\"img\">\n<title>" + xml_text(title) + "</title>\n" + style() +
-           "<clipPath id=\"plot\"><rect x=\"" + number(kLeft) + "\" y=\"" + number(kTop) +
-           "\" width=\"" + number(kWidth - kRight - kLeft) + "\" height=\"" + number(kPlotHeight) +
-           "\"/></clipPath>\n<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n" +
-           drawing.out() + "</svg>\n";
+    return fmt::format(
+        R"(<svg xmlns="http://www.w3.org/2000/svg" width="{0:.2f}" height="{1:.2f}" viewBox="0 0 {0:.2f} {1:.2f}" role="img">
+<title>{2}</title>
+{3}<clipPath id="plot"><rect x="{4:.2f}" y="{5:.2f}" width="{6:.2f}" height="{7:.2f}"/></clipPath>
+<rect class="paper" width="100%" height="100%"/>
+{8}</svg>
+)",
+        kWidth, height, xml_text(title), style(), kLeft, kTop, kWidth - kRight - kLeft, kPlotHeight,
+        drawing.out());
 }
 
 void write_file(const std::string& path, const std::string& text) {
