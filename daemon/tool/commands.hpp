@@ -6,8 +6,10 @@
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <memory>
+#include <vector>
 
 #include "daemon/results/exit_status.hpp"
+#include "proto/option_value.hpp"
 
 namespace vibrig::tool {
 
@@ -59,6 +61,23 @@ template <class Options>
         exit_code = guarded([&] { return run(*options); }, who);
     });
     return {app, *options};
+}
+
+using proto::kAboveZero;
+
+/// An option that takes a number as proto::finite() has it; `Number`: double, or an optional one.
+template <class Number>
+CLI::Option* add_number(CLI::App& command, const char* name, Number& value, const char* help,
+                        double low = proto::kAnyLow, double high = proto::kAnyHigh) {
+    return command.add_option(name, value, help)->check(proto::finite(low, high));
+}
+
+/// So many of them with commas between; `count` 0: any number of them.
+inline CLI::Option* add_numbers(CLI::App& command, const char* name, std::vector<double>& values,
+                                int count, const char* help, double low = proto::kAnyLow,
+                                double high = proto::kAnyHigh) {
+    CLI::Option* const option = add_number(command, name, values, help, low, high)->delimiter(',');
+    return count > 0 ? option->expected(count) : option;
 }
 
 }  // namespace vibrig::tool

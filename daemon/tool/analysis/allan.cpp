@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -8,6 +7,7 @@
 
 #include "daemon/tool/analysis/allan_analysis.hpp"
 #include "daemon/tool/commands.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -33,10 +33,7 @@ CLI::Validator number_in(double low, double high, const std::string& expected) {
     return CLI::Validator(
         [low, high, expected](std::string& text) {
             double value = 0;
-            const auto [end, error] =
-                std::from_chars(text.data(), text.data() + text.size(), value);
-            const bool good = error == std::errc{} && end == text.data() + text.size() &&
-                              value >= low && value <= high;
+            const bool good = proto::read_number(text, value) && value >= low && value <= high;
             return good ? std::string() : "found \"" + text + "\", expected " + expected;
         },
         "");

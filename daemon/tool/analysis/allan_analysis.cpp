@@ -1,7 +1,6 @@
 #include "daemon/tool/analysis/allan_analysis.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,7 +8,9 @@
 #include <stdexcept>
 
 #include "daemon/results/progress.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/column_file.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -18,10 +19,6 @@ namespace {
 constexpr double kTimeTolerance = 0.01;  // of tau0
 constexpr std::size_t kFitGrid = 30;
 
-[[noreturn]] void fail(const std::ostringstream& message) {
-    throw std::runtime_error(message.str());
-}
-
 /// Samples on a uniform grid by their time stamps; what is not there becomes NaN. Sets tau0 to the
 /// median step if it is 0.
 std::vector<double> on_grid(const ColumnFile& file, const std::string& name, double& tau0) {
@@ -29,10 +26,9 @@ std::vector<double> on_grid(const ColumnFile& file, const std::string& name, dou
     std::vector<double> steps;
     for (std::size_t i = 1; i < t.size(); ++i) {
         if (!(t[i] > t[i - 1])) {
-            std::ostringstream message;
-            message << name << ": time " << t[i] << " s follows " << t[i - 1] << " s at sample "
-                    << i + 1 << ", expected growing times";
-            fail(message);
+            throw std::runtime_error(
+                name + printed(": time %g s follows %g s at sample %zu, expected growing times",
+                               t[i], t[i - 1], i + 1));
         }
         steps.push_back(t[i] - t[i - 1]);
     }
@@ -54,20 +50,19 @@ std::vector<double> on_grid(const ColumnFile& file, const std::string& name, dou
         }
         const double most = 10.0 * static_cast<double>(t.size()) + 1000;
         if (static_cast<double>(values.size()) + whole > most) {
-            std::ostringstream message;
-            message << name << ": a step of " << ratio * tau0 << " s at sample " << i + 1
-                    << ", most of the record would be missing at tau0 = " << tau0 << " s";
-            fail(message);
+            throw std::runtime_error(
+                name + printed(": a step of %g s at sample %zu, most of the record would be "
+                               "missing at tau0 = %g s",
+                               ratio * tau0, i + 1, tau0));
         }
         values.insert(values.end(), static_cast<std::size_t>(whole) - 1, kNaN);
         values.push_back(file.values[i]);
     }
     if (worst > kTimeTolerance) {
-        std::ostringstream message;
-        message << name << ": times are not uniform: the step to sample " << where + 1 << " (time "
-                << t[where] << " s) is off by " << 100 * worst << " % of tau0 = " << tau0
-                << " s, at most " << 100 * kTimeTolerance << " % allowed";
-        fail(message);
+        throw std::runtime_error(
+            name + printed(": times are not uniform: the step to sample %zu (time %g s) is off by "
+                           "%g %% of tau0 = %g s, at most %g %% allowed",
+                           where + 1, t[where], 100 * worst, tau0, 100 * kTimeTolerance));
     }
     return values;
 }
@@ -86,8 +81,7 @@ std::vector<std::size_t> factors_asked(const AllanRequest& request, std::size_t 
     std::istringstream list(request.taus);
     for (std::string item; std::getline(list, item, ',');) {
         double tau = 0;
-        const auto [end, error] = std::from_chars(item.data(), item.data() + item.size(), tau);
-        if (error != std::errc{} || end != item.data() + item.size() || !(tau > 0)) {
+        if (!proto::read_number(item, tau) || !(tau > 0)) {
             throw std::runtime_error("--taus: \"" + item +
                                      "\" found, expected octave, decade, all or seconds such as "
                                      "1,10,100");
@@ -135,10 +129,9 @@ void run_windows(const std::vector<double>& values, AllanAnalysis& analysis) {
     const allan::DynamicSettings settings = dynamic_settings(request);
     const std::size_t rates = request.phase ? values.size() - 1 : values.size();
     if (settings.window > rates) {
-        std::ostringstream message;
-        message << "--dynamic: a window of " << request.window_s << " s is " << settings.window
-                << " samples, the record has " << rates;
-        fail(message);
+        throw std::runtime_error(
+            printed("--dynamic: a window of %g s is %zu samples, the record has %zu",
+                    request.window_s, settings.window, rates));
     }
     allan::DynamicAllan dynamic(settings);
     allan::StationarityMonitor monitor({request.alpha, 5}, dynamic);
@@ -169,10 +162,10 @@ void warn(const allan::Inspection& found, std::vector<double>& values, AllanAnal
     if (found.outliers > 0) {
         const bool drop = analysis.request.drop_outliers;
         analysis.warnings.push_back(
-            std::to_string(found.outliers) +
-            " outliers (more than 10 median absolute deviations), the first at sample " +
-            std::to_string(found.first_outlier + 1) +
-            (drop ? ", treated as missing" : "; kept, see --drop-outliers"));
+            printed("%zu outliers (more than 10 median absolute deviations), the first at sample "
+                    "%zu%s",
+                    found.outliers, found.first_outlier + 1,
+                    drop ? ", treated as missing" : "; kept, see --drop-outliers"));
         if (drop) {
             // Again and again would eat the tails of the distribution: once is what was asked.
             for (const std::size_t i : allan::outliers(values)) {
@@ -189,18 +182,15 @@ void check_range(const AllanRequest& request, const std::vector<double>& values)
             "--tau0: the step between samples in s is needed (or --time COLUMN)");
     }
     if (request.tau0 < kShortestStep || request.tau0 > kLongestStep) {
-        std::ostringstream message;
-        message << request.file << ": steps of " << request.tau0
-                << " s found, expected 1e-9 to 1e9 s";
-        fail(message);
+        throw std::runtime_error(
+            request.file + printed(": steps of %g s found, expected 1e-9 to 1e9 s", request.tau0));
     }
     const auto large = std::find_if(values.begin(), values.end(),
                                     [](double v) { return std::abs(v) > kLargestValue; });
     if (large != values.end()) {
-        std::ostringstream message;
-        message << request.file << ": sample " << large - values.begin() + 1 << ": " << *large
-                << " found, expected at most " << kLargestValue;
-        fail(message);
+        throw std::runtime_error(request.file +
+                                 printed(": sample %td: %g found, expected at most %g",
+                                         large - values.begin() + 1, *large, kLargestValue));
     }
 }
 
@@ -271,10 +261,10 @@ AllanAnalysis analyse(const AllanRequest& asked) {
     analysis.missing = series.missing;
     analysis.longest_gap = series.longest_gap;
     if (series.missing > 0) {
-        std::ostringstream note;
-        note << series.missing << " samples are missing (longest gap " << series.longest_gap
-             << "): no difference spans a gap, degrees of freedom are lowered accordingly";
-        analysis.warnings.push_back(note.str());
+        analysis.warnings.push_back(
+            printed("%zu samples are missing (longest gap %zu): no difference spans a gap, degrees "
+                    "of freedom are lowered accordingly",
+                    series.missing, series.longest_gap));
     }
     analysis.points = curve(series, request);
     if (request.fit) {

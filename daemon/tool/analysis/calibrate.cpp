@@ -16,7 +16,6 @@
 #include "estimator/allan/edf.hpp"
 #include "estimator/plan/calibration.hpp"
 #include "proto/json_number.hpp"
-#include "proto/option_value.hpp"
 
 namespace vibrig::tool::calibration {
 
@@ -243,12 +242,11 @@ void add_calibrate(CLI::App& app, int& exit_code) {
                     "y (output); sigma (1 sigma of y) and count (readings that y is the mean of) "
                     "if known")
         ->required();
-    command.add_option("--sigma", options.sigma, "1 sigma of one reading, if known")
-        ->check(proto::finite(proto::kAboveZero));
+    add_number(command, "--sigma", options.sigma, "1 sigma of one reading, if known", kAboveZero);
     command.add_option("--without", options.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
-    command.add_option("--level", options.level, "of the tests of the residuals (0.01)")
-        ->check(proto::finite(1e-9, 0.5));
+    add_number(command, "--level", options.level, "of the tests of the residuals (0.01)", 1e-9,
+               0.5);
     command.add_option("--plot", options.plot, "an SVG file, or a folder: the residuals");
     command.add_flag("--json", options.json, "print the result as JSON");
     command.footer(

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -36,8 +35,7 @@ bool parse(std::string_view field, double& value) {
         return true;
     }
     field.remove_prefix(field.front() == '+' ? 1 : 0);
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    return error == std::errc{} && end == field.data() + field.size() && std::isfinite(value);
+    return proto::read_number(field, value) && std::isfinite(value);
 }
 
 std::string shown(std::string_view text) {
@@ -163,11 +161,8 @@ class Parser {
             return static_cast<std::size_t>(at - fields.begin());
         }
         std::size_t position = 0;
-        const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), position);
-        if (error == std::errc{} && end == name.data() + name.size() && position >= 1 &&
-            position <= fields.size()) {
+        if (proto::read_number(name, position) && position >= 1 && position <= fields.size())
             return position - 1;
-        }
         fail("no column \"" + name + "\", found " + joined(fields));
     }
 

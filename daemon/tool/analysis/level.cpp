@@ -67,70 +67,44 @@ namespace {
 
 constexpr double kRightAngle = 5400;  // arcmin
 
-void add_two(CLI::App& command, const char* name, std::vector<double>& value, double most,
-             const char* help) {
-    command.add_option(name, value, help)
-        ->expected(2)
-        ->delimiter(',')
-        ->check(proto::finite(-most, most));
-}
-
 void add_design_options(CLI::App& command, Options& o) {
-    add_two(command, "--tilt", o.tilt, kRightAngle, "of both channels at first, arcmin (30,-20)");
-    add_two(command, "--drift", o.drift, 1e6, "deg/h (0.1,-0.1)");
-    command.add_option("--settling", o.specification.settling_s, "settling time in s (100)")
-        ->check(proto::finite(proto::kAboveZero, 1e7));
-    command
-        .add_option("--residual", o.specification.residual,
-                    "fraction of the initial tilt left then (0.005)")
-        ->check(proto::finite());
-    command.add_option("--damping", o.specification.damping, "ratio xi (0.7)")
-        ->check(proto::finite());
-    command.add_option("--gains", o.gains, "K1,K2,K3 instead of a design")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(proto::finite());
-    command.add_option("--period", o.period_s, "s between samples (0.1)")
-        ->check(proto::finite(1e-4, 1e4));
-    command
-        .add_option("--window", o.window_s,
-                    "of the means in s (1); shaker on: whole vibration periods")
-        ->check(proto::finite(proto::kAboveZero, 3600));
-    command
-        .add_option("--tolerance", o.tolerance,
-                    "arcmin; default the larger of 0.05 and four times the noise of the means")
-        ->check(proto::finite(proto::kAboveZero, 300));
-    command.add_option("--reference-noise", o.reference_noise, "m/s per sample (0)")
-        ->check(proto::finite(0, 1000));
-    command.add_option("--accelerometer-noise", o.accelerometer_noise_g, "g per sample (1e-5)")
-        ->check(proto::finite(0, 1));
-    command.add_option("--gyro-noise", o.gyro_noise, "random walk, deg/sqrt(h) (0)")
-        ->check(proto::finite(0, 100));
-    command.add_option("--gravity", o.gravity, "m/s^2 (9.80665)")->check(proto::finite(1, 30));
+    add_numbers(command, "--tilt", o.tilt, 2, "of both channels at first, arcmin (30,-20)",
+                -kRightAngle, kRightAngle);
+    add_numbers(command, "--drift", o.drift, 2, "deg/h (0.1,-0.1)", -1e6, 1e6);
+    add_number(command, "--settling", o.specification.settling_s, "settling time in s (100)",
+               kAboveZero, 1e7);
+    add_number(command, "--residual", o.specification.residual,
+               "fraction of the initial tilt left then (0.005)");
+    add_number(command, "--damping", o.specification.damping, "ratio xi (0.7)");
+    add_numbers(command, "--gains", o.gains, 3, "K1,K2,K3 instead of a design");
+    add_number(command, "--period", o.period_s, "s between samples (0.1)", 1e-4, 1e4);
+    add_number(command, "--window", o.window_s,
+               "of the means in s (1); shaker on: whole vibration periods", kAboveZero, 3600);
+    add_number(command, "--tolerance", o.tolerance,
+               "arcmin; default the larger of 0.05 and four times the noise of the means",
+               kAboveZero, 300);
+    add_number(command, "--reference-noise", o.reference_noise, "m/s per sample (0)", 0, 1000);
+    add_number(command, "--accelerometer-noise", o.accelerometer_noise_g, "g per sample (1e-5)", 0,
+               1);
+    add_number(command, "--gyro-noise", o.gyro_noise, "random walk, deg/sqrt(h) (0)", 0, 100);
+    add_number(command, "--gravity", o.gravity, "m/s^2 (9.80665)", 1, 30);
     command.add_flag("--json", o.json, "print the result as JSON");
     command.add_option("--plot", o.plot, "an SVG file (simulate: or a folder)");
 }
 
 void add_simulate_options(CLI::App& command, Options& o) {
-    add_two(command, "--zero", o.zero_mg, 1000, "of the accelerometers, mg (0,0)");
-    add_two(command, "--reference-error", o.reference_error, 1000, "constant, m/s (0,0)");
-    auto* step = command.add_option("--step", o.step, "both channels tip by so much, arcmin")
-                     ->check(proto::finite(-kRightAngle, kRightAngle));
-    command.add_option("--step-at", o.step_s, "when, s; with --runs at any time")
-        ->check(proto::finite(0))
-        ->needs(step);
-    command.add_option("--slow", o.slow, "K1,K2,K3 to ramp to after settling")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(proto::finite());
-    command.add_option("--ramp", o.ramp_s, "length of that ramp, s (60)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
-    command.add_option("--torquer-limit", o.torquer_limit, "deg/h (3276.7)")
-        ->check(proto::finite(proto::kAboveZero, 1e9));
+    add_numbers(command, "--zero", o.zero_mg, 2, "of the accelerometers, mg (0,0)", -1000, 1000);
+    add_numbers(command, "--reference-error", o.reference_error, 2, "constant, m/s (0,0)", -1000,
+                1000);
+    auto* step = add_number(command, "--step", o.step, "both channels tip by so much, arcmin",
+                            -kRightAngle, kRightAngle);
+    add_number(command, "--step-at", o.step_s, "when, s; with --runs at any time", 0)->needs(step);
+    add_numbers(command, "--slow", o.slow, 3, "K1,K2,K3 to ramp to after settling");
+    add_number(command, "--ramp", o.ramp_s, "length of that ramp, s (60)", kAboveZero, 1e6);
+    add_number(command, "--torquer-limit", o.torquer_limit, "deg/h (3276.7)", kAboveZero, 1e9);
     command.add_option("--network", o.network, "fast (default), conventional, undamped")
         ->check(CLI::IsMember({"fast", "conventional", "undamped"}));
-    command.add_option("--duration", o.duration_s, "s (3.1 settling times)")
-        ->check(proto::finite(proto::kAboveZero, 1e9));
+    add_number(command, "--duration", o.duration_s, "s (3.1 settling times)", kAboveZero, 1e9);
     command.add_option("--seed", o.seed, "of the noise (1)")->check(proto::whole());
     command
         .add_option("--runs", o.runs,

@@ -18,7 +18,6 @@
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "proto/json_file.hpp"
-#include "proto/option_value.hpp"
 
 namespace vibrig::tool {
 
@@ -336,22 +335,19 @@ void add_predict(CLI::App& app, int& exit_code) {
         ->allow_extra_args(false);
     command.add_option("--at", options.at, "where the profile holds: platform, or table (pads)")
         ->check(CLI::IsMember({"platform", "table"}));
-    command
-        .add_option("--seconds", options.seconds,
-                    "mean over so long: what a random vibration's realisation varies is added")
-        ->check(proto::finite(proto::kAboveZero, 1e7));
+    add_number(command, "--seconds", options.seconds,
+               "mean over so long: what a random vibration's realisation varies is added",
+               kAboveZero, 1e7);
     command.add_option("--verify", options.recording,
                        "recording of dwells under the profile that were not in the fit");
-    command
-        .add_option("--tolerance", options.tolerance,
-                    "deg/h that two standard deviations stay below in a tight test "
-                    "(spectrum.tolerance_deg_h)")
-        ->check(proto::finite(proto::kAboveZero, 1e3));
-    command
-        .add_option("--elastic-beyond", options.elastic_beyond,
-                    "elastic part allowed for beyond what was measured, of the static "
-                    "(spectrum.elastic_beyond)")
-        ->check(proto::finite(0, 100));
+    add_number(command, "--tolerance", options.tolerance,
+               "deg/h that two standard deviations stay below in a tight test "
+               "(spectrum.tolerance_deg_h)",
+               kAboveZero, 1e3);
+    add_number(command, "--elastic-beyond", options.elastic_beyond,
+               "elastic part allowed for beyond what was measured, of the static "
+               "(spectrum.elastic_beyond)",
+               0, 100);
     command.add_flag("--same-accelerometers", options.same_accelerometers,
                      "the profile was measured with the campaign's: their gain cancels");
     command.add_option("--config", options.config, "configuration file (TOML) of the rig");

@@ -196,46 +196,32 @@ int run_simulate(const Options& options) {
 
 void add_common(CLI::App& command, Options& o) {
     zeros::CalibrationSettings& s = o.calibration;
-    command.add_option("--latitude", o.latitude_deg, "deg (45.75)")->check(proto::finite(-89, 89));
-    command.add_option("--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)")
-        ->check(proto::finite(1, 30));
-    command.add_option("--slews", o.slews, "azimuths in deg (0,90,-90,90); the last two repeat")
-        ->delimiter(',')
-        ->check(proto::finite(-360, 360));
-    command.add_option("--rate", s.plan.rate_deg_s, "of the slews, deg/s (5)")
-        ->check(proto::finite(proto::kAboveZero, 100));
-    command.add_option("--duration", s.plan.duration_s, "s (180)")
-        ->check(proto::finite(proto::kAboveZero, 86400));
+    add_number(command, "--latitude", o.latitude_deg, "deg (45.75)", -89, 89);
+    add_number(command, "--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)", 1, 30);
+    add_numbers(command, "--slews", o.slews, 0,
+                "azimuths in deg (0,90,-90,90); the last two repeat", -360, 360);
+    add_number(command, "--rate", s.plan.rate_deg_s, "of the slews, deg/s (5)", kAboveZero, 100);
+    add_number(command, "--duration", s.plan.duration_s, "s (180)", kAboveZero, 86400);
     command.add_flag("--static", s.allow_unobservable,
                      "go on with a plan that cannot tell zeros from tilt");
     command.add_option("--upright", o.upright, "platform axis turned about, y or z (z)")
         ->check(CLI::IsMember({"y", "z"}));
     command.add_flag("--inverted", s.inverted, "that axis down");
-    command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(proto::finite(-10, 10));
-    command.add_option("--gyro-noise", s.noise.angle_random_walk, "deg/sqrt(h) (0.01)")
-        ->check(proto::finite(0, 100));
-    command.add_option("--accelerometer-noise", s.noise.velocity_random_walk, "g/sqrt(Hz) (2e-5)")
-        ->check(proto::finite(0, 1));
-    command
-        .add_option("--velocity-noise", s.noise.velocity_reference, "of the reference, m/s (0.005)")
-        ->check(proto::finite(proto::kAboveZero, 1000));
-    command
-        .add_option("--position-noise", s.noise.position_reference, "of the reference, m (0.01)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
-    command
-        .add_option("--scale-uncertainty", o.scale_ppm, "of the vertical accelerometer, ppm (100)")
-        ->check(proto::finite(0, 1e6));
-    command
-        .add_option("--misalignment-uncertainty", o.misalignment_arcsec,
-                    "of x and y against the gyros, arcsec (50)")
-        ->check(proto::finite(0, 1e5));
-    command
-        .add_option("--vibration-limit", s.vibration_limit_g,
-                    "g, standard deviation within 1 s (0.01)")
-        ->check(proto::finite(proto::kAboveZero, 10));
+    add_numbers(command, "--lever-arm", o.lever_arm, 3,
+                "from the azimuth axis, body axes, m (0,0,0)", -10, 10);
+    add_number(command, "--gyro-noise", s.noise.angle_random_walk, "deg/sqrt(h) (0.01)", 0, 100);
+    add_number(command, "--accelerometer-noise", s.noise.velocity_random_walk, "g/sqrt(Hz) (2e-5)",
+               0, 1);
+    add_number(command, "--velocity-noise", s.noise.velocity_reference,
+               "of the reference, m/s (0.005)", kAboveZero, 1000);
+    add_number(command, "--position-noise", s.noise.position_reference,
+               "of the reference, m (0.01)", kAboveZero, 1e6);
+    add_number(command, "--scale-uncertainty", o.scale_ppm,
+               "of the vertical accelerometer, ppm (100)", 0, 1e6);
+    add_number(command, "--misalignment-uncertainty", o.misalignment_arcsec,
+               "of x and y against the gyros, arcsec (50)", 0, 1e5);
+    add_number(command, "--vibration-limit", s.vibration_limit_g,
+               "g, standard deviation within 1 s (0.01)", kAboveZero, 10);
     command.add_flag("--json", o.json, "print the result as JSON");
     command.add_option("--plot", o.plot, "an SVG file");
 }
@@ -277,24 +263,12 @@ void add_zero(CLI::App& app, int& exit_code) {
         "Exit codes: 0 valid, 1 not valid (says why), 2 bad usage or input.");
     CLI::App* simulate = command->add_subcommand("simulate", "A simulated unit instead of a file");
     add_common(*simulate, *options);
-    simulate->add_option("--zero", options->zero_mg, "mg (5,-5,5)")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(proto::finite(-1000, 1000));
-    simulate->add_option("--scale", options->real_scale_ppm, "errors, ppm (0,0,0)")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(proto::finite(-1e5, 1e5));
-    simulate
-        ->add_option("--misalignment", options->real_misalignment_arcsec,
-                     "of x and y towards z, arcsec (0,0)")
-        ->expected(2)
-        ->delimiter(',')
-        ->check(proto::finite(-1e4, 1e4));
-    simulate->add_option("--period", options->period_s, "of the increments, s (0.01)")
-        ->check(proto::finite(1e-4, 0.1));
-    simulate->add_option("--vibration", options->vibration_g, "peak at 15 Hz, g (0)")
-        ->check(proto::finite(0, 10));
+    add_numbers(*simulate, "--zero", options->zero_mg, 3, "mg (5,-5,5)", -1000, 1000);
+    add_numbers(*simulate, "--scale", options->real_scale_ppm, 3, "errors, ppm (0,0,0)", -1e5, 1e5);
+    add_numbers(*simulate, "--misalignment", options->real_misalignment_arcsec, 2,
+                "of x and y towards z, arcsec (0,0)", -1e4, 1e4);
+    add_number(*simulate, "--period", options->period_s, "of the increments, s (0.01)", 1e-4, 0.1);
+    add_number(*simulate, "--vibration", options->vibration_g, "peak at 15 Hz, g (0)", 0, 10);
     simulate->add_option("--seed", options->seed, "of the noise (1)")->check(proto::whole());
     simulate->add_flag("--both-ways", options->both_ways,
                        "a second run with z down, for zeros apart from misalignment and scale");

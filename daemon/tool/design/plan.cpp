@@ -105,12 +105,9 @@ void add_turntable(CLI::App& command, Options& options) {
         "--turntable", options.on_turntable,
         "a plan for a turntable or centrifuge instead of the rig: inputs on spheres, for vibrig "
         "calibrate (-o: CSV to be filled in)");
-    command
-        .add_option("--spheres", options.turntable.spheres,
-                    "with --turntable: radii, g or deg/s (1,2)")
-        ->delimiter(',')
-        ->needs(turntable)
-        ->check(proto::finite(proto::kAboveZero, 1e6));
+    add_numbers(command, "--spheres", options.turntable.spheres, 0,
+                "with --turntable: radii, g or deg/s (1,2)", kAboveZero, 1e6)
+        ->needs(turntable);
     command
         .add_option(
             "--allocation", options.turntable.allocation,
@@ -130,48 +127,34 @@ void add_candidates(CLI::App& command, Options& options) {
     command.add_option("--positions", request.positions,
                        "CSV with alpha_deg, beta_deg, gamma_deg: the candidates; without --runs "
                        "the list itself is judged (default: the 26 directions of the cube)");
-    command
-        .add_option("--levels", request.levels_g,
-                    "peak acceleration at the platform, g (0,2,4,4.667,6)")
-        ->delimiter(',')
-        ->check(proto::finite(0, 1e3));
-    command.add_option("--grid", request.grid_deg, "candidates every so many deg of each gimbal")
-        ->check(proto::finite(5, 90));
+    add_numbers(command, "--levels", request.levels_g, 0,
+                "peak acceleration at the platform, g (0,2,4,4.667,6)", 0, 1e3);
+    add_number(command, "--grid", request.grid_deg, "candidates every so many deg of each gimbal",
+               5, 90);
     for (const auto& [name, range] :
          {std::pair{"--outer", &options.outer}, std::pair{"--inner", &options.inner},
           std::pair{"--azimuth", &options.azimuth}}) {
-        command
-            .add_option(name, *range,
-                        "gimbal limits LOW,HIGH as the encoders count, deg (gimbal.travel_deg)")
-            ->delimiter(',')
-            ->expected(2)
-            ->check(proto::finite());
+        add_numbers(command, name, *range, 2,
+                    "gimbal limits LOW,HIGH as the encoders count, deg (gimbal.travel_deg)");
     }
     command.add_option("--forbidden", request.forbidden, "CSV of positions to keep away from");
-    command
-        .add_option("--forbidden-within", request.limits.forbidden_within,
-                    "largest difference of the three angles that counts as near, deg (10)")
-        ->check(proto::finite(0, 360));
-    command
-        .add_option("--noise-per-g", request.noise_per_g,
-                    "noise grows with the level as hypot(1, this x level) (0)")
-        ->check(proto::finite(0, 1e3));
+    add_number(command, "--forbidden-within", request.limits.forbidden_within,
+               "largest difference of the three angles that counts as near, deg (10)", 0, 360);
+    add_number(command, "--noise-per-g", request.noise_per_g,
+               "noise grows with the level as hypot(1, this x level) (0)", 0, 1e3);
     command.add_option("--without", request.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
 }
 
 void add_survey(CLI::App& command, Options& options) {
     SurveyRequest& survey = options.request.survey;
-    command
-        .add_option("--frequencies", survey.frequencies,
-                    "a survey over frequency: Hz, the first one with all positions "
-                    "(vibration.frequency_hz); moved off those that sampling forbids")
-        ->delimiter(',')
-        ->check(proto::finite(1, 20'000));
-    command
-        .add_option("--highest", survey.highest_hz,
-                    "further frequencies at even ratios up to here, Hz (the profile's highest)")
-        ->check(proto::finite(1, 20'000));
+    add_numbers(command, "--frequencies", survey.frequencies, 0,
+                "a survey over frequency: Hz, the first one with all positions "
+                "(vibration.frequency_hz); moved off those that sampling forbids",
+                1, 20'000);
+    add_number(command, "--highest", survey.highest_hz,
+               "further frequencies at even ratios up to here, Hz (the profile's highest)", 1,
+               20'000);
     command
         .add_option("--mount", survey.mount,
                     "isolated, or hard: the platform bolted to the table (spectrum.mount)")
@@ -185,16 +168,12 @@ void add_survey(CLI::App& command, Options& options) {
                     "positions)")
         ->allow_extra_args(false);
     CLI::Option* sweeps =
-        command
-            .add_option("--sweeps", survey.sweeps,
-                        "LOW,HIGH in Hz: sweeps between them first, up and down, at the three "
-                        "positions that see most of all six quadratic coefficients")
-            ->delimiter(',')
-            ->expected(2)
-            ->check(proto::finite(0.1, 20'000));
-    command.add_option("--sweep-s", survey.sweep_s, "s of each sweep (300)")
-        ->needs(sweeps)
-        ->check(proto::finite(10, 86'400));
+        add_numbers(command, "--sweeps", survey.sweeps, 2,
+                    "LOW,HIGH in Hz: sweeps between them first, up and down, at the three "
+                    "positions that see most of all six quadratic coefficients",
+                    0.1, 20'000);
+    add_number(command, "--sweep-s", survey.sweep_s, "s of each sweep (300)", 10, 86'400)
+        ->needs(sweeps);
     command
         .add_option("--about", survey.about,
                     "JSON of vibrig identify, or result.json of vibrigd: frequencies below and "
@@ -206,14 +185,11 @@ void add_time(CLI::App& command, Options& options) {
     PlanRequest& request = options.request;
     command.add_flag("--time-costs", request.time_costs,
                      "compare plans per time, ramps included, not per run");
-    command.add_option("--dwell", options.dwell, "s of one run (100)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
-    command.add_option("--settle", options.settle, "s after the ramp (3)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
-    command.add_option("--ramp", options.ramp, "s to the level, and back (2)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
-    command.add_option("--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)")
-        ->check(proto::finite(proto::kAboveZero, 1e6));
+    add_number(command, "--dwell", options.dwell, "s of one run (100)", kAboveZero, 1e6);
+    add_number(command, "--settle", options.settle, "s after the ramp (3)", kAboveZero, 1e6);
+    add_number(command, "--ramp", options.ramp, "s to the level, and back (2)", kAboveZero, 1e6);
+    add_number(command, "--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)", kAboveZero,
+               1e6);
     command
         .add_option(
             "--order", request.order,
@@ -242,13 +218,10 @@ void add_plan(CLI::App& app, int& exit_code) {
                         "judge this plan: JSON as printed here, or CSV with alpha_deg, beta_deg, "
                         "gamma_deg, level_g, count");
     command->add_option("--done", request.done, "plan file of runs that are measured already");
-    command
-        ->add_option("--targets", request.targets,
-                     "as few runs as reach these standard errors: bias, linear, quadratic (deg/h, "
-                     "deg/h/g, deg/h/g^2; 0: any)")
-        ->delimiter(',')
-        ->expected(3)
-        ->check(proto::finite(0));
+    add_numbers(*command, "--targets", request.targets, 3,
+                "as few runs as reach these standard errors: bias, linear, quadratic (deg/h, "
+                "deg/h/g, deg/h/g^2; 0: any)",
+                0);
     planner::add_time(*command, *options);
     planner::add_survey(*command, *options);
     command->add_option("--seed", request.seed, "of the random starts (1)")->check(proto::whole());
@@ -266,11 +239,9 @@ void add_plan(CLI::App& app, int& exit_code) {
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
         "asks for\nmore than the shaker's limits, 2 bad usage or input.");
     for (const char* other : {"--evaluate", "--done", "--targets", "--grid", "--time-costs"}) {
-        command->get_option(other)->excludes(command->get_option("--frequencies"));
-        command->get_option(other)->excludes(command->get_option("--highest"));
-        command->get_option(other)->excludes(command->get_option("--profile"));
-        command->get_option(other)->excludes(command->get_option("--sweeps"));
-        command->get_option(other)->excludes(command->get_option("--about"));
+        for (const char* survey :
+             {"--frequencies", "--highest", "--profile", "--sweeps", "--about"})
+            command->get_option(other)->excludes(command->get_option(survey));
     }
     const CLI::Option* order = command->get_option("--order");
     command->callback([options, order, &exit_code] {

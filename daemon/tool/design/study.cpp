@@ -13,7 +13,6 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "daemon/tool/design/study_submit.hpp"
-#include "proto/option_value.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -187,8 +186,7 @@ void add_run(CLI::App& study, const std::shared_ptr<StudyOptions>& o, int& exit_
         ->check(CLI::Range(1, 1024));
     command->add_option("--shard", o->shard, "I/N: the I-th of N parts, from 0")
         ->capture_default_str();
-    command->add_option("--chunk", o->chunk_s, "s between two writes")
-        ->check(proto::finite(0.0, 3600.0))
+    add_number(*command, "--chunk", o->chunk_s, "s between two writes", 0.0, 3600.0)
         ->capture_default_str();
     command->footer(
         "Example: vibrig study run s/ -j 8\n"

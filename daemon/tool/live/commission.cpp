@@ -31,7 +31,6 @@
 #include "daemon/tool/live/key_by_key.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
-#include "google/protobuf/util/json_util.h"
 #include "proto/durable_file.hpp"
 
 namespace vibrig::tool {
@@ -50,18 +49,8 @@ std::string commission_command(serve::Client& client, const std::string& by,
     command.set_kind(v1::Command::commission);
     command.set_by(by);
     command.set_argument(what.dump());
-    std::string json;
-    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
-        throw serve::ClientError("--by: not UTF-8");
-    const serve::Reply reply = client.post("/api/v1/commands", json);
-    if (reply.status == 409 || reply.status == 403) {
-        v1::Problem problem;
-        google::protobuf::util::JsonParseOptions options;
-        options.ignore_unknown_fields = true;
-        static_cast<void>(
-            google::protobuf::util::JsonStringToMessage(reply.body, &problem, options));
-        throw CommissionRefused(problem.detail());
-    }
+    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
+    if (reply.status == 409 || reply.status == 403) throw CommissionRefused(problem_of(reply));
     v1::CommandReply answer;
     parse_answer(reply, answer);
     return answer.message();
@@ -362,10 +351,14 @@ void add_identity(CLI::App& command, CommissionOptions& options) {
                        "Sign what is recorded: FOLDER/NAME of `vibrig pki init`");
 }
 
-void add_persons(CLI::App& command, CommissionOptions& options) {
+void add_local_socket(CLI::App& command, CommissionOptions& options) {
     options.at.socket = default_socket();
     command.add_option("--socket", options.at.socket, "Unix socket of the daemon")
         ->capture_default_str();
+}
+
+void add_persons(CLI::App& command, CommissionOptions& options) {
+    add_local_socket(command, options);
     command.add_option("--by", options.by, "Who stands at the rig; goes into the record")
         ->required();
 }
@@ -378,7 +371,6 @@ void add_commission(CLI::App& app, int& exit_code) {
         "Find out how a rig is wired, by moving its gimbals one by one, and record it. By command "
         "where its angles are in degrees, else by hand (--by-hand)");
     auto options = std::make_shared<CommissionOptions>();
-    options->at.socket = default_socket();
     commissioning
         .add_option(
             "parts", options->parts,
@@ -386,8 +378,7 @@ void add_commission(CLI::App& app, int& exit_code) {
             "persons; then watchdog stop units excitation: the shaker's, by proofs of the safe "
             "state at a small level. Without: all of the first")
         ->expected(0, 5);
-    commissioning.add_option("--socket", options->at.socket, "Unix socket of the daemon")
-        ->capture_default_str();
+    add_local_socket(commissioning, *options);
     commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
     commissioning.add_option("--second", options->second, "Another person, for gyros");
     add_identity(commissioning, *options);
@@ -427,10 +418,8 @@ void add_commission(CLI::App& app, int& exit_code) {
     auto shown = std::make_shared<CommissionOptions>();
     CLI::App& status = *commissioning.add_subcommand(
         "status", "Which parts are proven; exit code 1 unless all are");
-    shown->at.socket = default_socket();
     shown->by = "status";
-    status.add_option("--socket", shown->at.socket, "Unix socket of the daemon")
-        ->capture_default_str();
+    add_local_socket(status, *shown);
     status.add_flag("--json", shown->json, "As JSON");
     status.footer("Example: vibrig commission status");
     run_as(status, exit_code, shown, show_commission);

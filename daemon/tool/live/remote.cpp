@@ -14,7 +14,6 @@
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
-#include "proto/option_value.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -41,13 +40,6 @@ struct TestOptions {
     std::string by;
     bool json = false, emergency_stop = false, at_zero = false, rest = false;
 };
-
-std::string json_of(const v1::Command& command) {
-    std::string json;
-    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
-        throw serve::ClientError("--by: not UTF-8");
-    return json;
-}
 
 std::string login_name() {
     const passwd* const entry = getpwuid(getuid());
@@ -258,6 +250,13 @@ void wait_for_rest(serve::Client& client) {
         std::this_thread::sleep_for(kLook);
 }
 
+std::string json_of(const v1::Command& command) {
+    std::string json;
+    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
+        throw serve::ClientError("--by: not UTF-8");
+    return json;
+}
+
 bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
 
 std::string problem_of(const serve::Reply& reply) {
@@ -363,8 +362,8 @@ void add_remote(CLI::App& app, int& exit_code) {
         "1 when that is not valid, or when it was aborted or tripped");
     watching.add_flag("--strict", watch_options.strict,
                       "With --until-finished: a doubtful result is a no as well");
-    watching.add_option("--interval", watch_options.interval_s, "Time between two looks, s")
-        ->check(proto::finite(0.05, 3600))
+    add_number(watching, "--interval", watch_options.interval_s, "Time between two looks, s", 0.05,
+               3600)
         ->capture_default_str();
     watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
 

@@ -19,6 +19,8 @@ void add_socket(CLI::App& command, serve::Address& at);
 [[nodiscard]] std::string problem_of(const serve::Reply& reply);
 /// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
 [[nodiscard]] bool is_no(int status);
+/// As the daemon takes it. Throws serve::ClientError where a name is not UTF-8.
+[[nodiscard]] std::string json_of(const v1::Command& command);
 /// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message);
 [[nodiscard]] v1::Status ask_status(serve::Client& client);
