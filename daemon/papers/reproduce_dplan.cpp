@@ -6,6 +6,7 @@
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/plan_study.hpp"
+#include "daemon/tool/design/plan_turntable.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
 
@@ -27,24 +28,8 @@ void add(Reproduction& table, const std::string& item, const std::string& publis
 
 constexpr std::size_t kFaces = 6, kEdges = 12, kAll = 26;
 
-/// The 26 directions times a factor; faces, edges, corners in this order.
-std::vector<planning::Point> sphere(double radius) {
-    std::vector<planning::Point> points;
-    for (Vec3 x : planning::cube_directions()) {
-        for (double& value : x) value *= radius;
-        points.push_back({planning::turntable_row(x)});
-    }
-    return points;
-}
-
 /// Both spheres: points 0 to 25 inside, 26 to 51 outside.
-Problem two_spheres(double r) {
-    Problem problem;
-    problem.points = sphere(1);
-    const auto outer = sphere(r);
-    problem.points.insert(problem.points.end(), outer.begin(), outer.end());
-    return problem;
-}
+Problem two_spheres(double r) { return planner::spheres_problem({1, r}); }
 
 /// Runs per point of the inner and outer sphere's faces and corners.
 Effort double_sphere(double inner_faces, double inner_corners, double outer_faces,
@@ -85,8 +70,7 @@ void add_ranks(Reproduction& table) {
                                         {"[12]", false, true, false, "9"},
                                         {"[6]+[8]", true, false, true, "9"},
                                         {"all 26", true, true, true, "9"}}};
-    Problem one;
-    one.points = sphere(1);
+    const Problem one = planner::spheres_problem({1});
     for (const Set& set : kSets) {
         Effort effort;
         for (std::size_t i = 0; i < kAll; ++i) {

@@ -7,7 +7,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "daemon/configuration/configuration.hpp"
 #include "daemon/tool/design/plan_terms.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -41,9 +40,7 @@ class Study {
   public:
     explicit Study(const PlanRequest& request)
         : request_(request), c_(configuration::load(request.config, false).configuration) {
-        timing_ = {request.dwell_s.value_or(c_.campaign.dwell_s),
-                   request.settle_s.value_or(c_.campaign.settle_s),
-                   request.ramp_s.value_or(c_.campaign.ramp_s), request.slew_deg_per_s};
+        timing_ = timing_of(request, c_);
         limits_ = request.limits;
         for (std::size_t k = 0; k < 3; ++k) {
             if (request.limited[k]) continue;
@@ -290,7 +287,7 @@ class Study {
             e.rows = estimator::rate_rows(c_.estimator,
                                           {estimator::gimbal_deg(c_.estimator, visit.position_deg),
                                            planning::kappa_of(visit.level_g), timing_.dwell_s},
-                                          {}, period());
+                                          {}, period_of(c_));
             const double noise = std::hypot(1.0, request_.noise_per_g * visit.level_g);
             for (double& x : e.rows) x /= noise;
             e.cost = point(visit).cost;
@@ -323,10 +320,6 @@ class Study {
         return sigma;
     }
 
-    [[nodiscard]] double period() const {
-        return static_cast<double>(c_.assembler.sample_period) * 1e-9;
-    }
-
     void put_in_order() {
         std::vector<planning::Visit> visits;
         std::vector<planning::Row> regressors;
@@ -346,7 +339,7 @@ class Study {
         } else if (!as_listed && request_.order == "balanced") {
             order = estimator::uncertainty::balanced_order(
                 visits, regressors, timing_,
-                estimator::rate_variance(c_.estimator, timing_.dwell_s, period()));
+                estimator::rate_variance(c_.estimator, timing_.dwell_s, period_of(c_)));
         } else if (!as_listed) {
             order = planning::randomised(regressors, std::max<std::size_t>(request_.block, 1),
                                          request_.seed);
@@ -374,7 +367,7 @@ class Study {
         std::vector<planning::Visit> visits;
         for (const PlanRun& run : out_.runs) visits.insert(visits.end(), run.count, run.visit);
         if (visits.size() < 2 || terms_ != planning::kAllTerms) return;
-        out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period());
+        out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period_of(c_));
         if (out_.uncertainty->merit.step > kMostStep)
             out_.warnings.push_back(
                 printed("in this order one step of a bias makes a standard error %.3g times as "
@@ -405,7 +398,8 @@ class Study {
             }
         }
         out_.evaluation = planning::evaluate(all, effort);
-        out_.forecast = plan::forecast(c_.estimator, planned, timing_.dwell_s, period(), terms_);
+        out_.forecast =
+            plan::forecast(c_.estimator, planned, timing_.dwell_s, period_of(c_), terms_);
         if (request_.noise_per_g > 0) {
             out_.warnings.emplace_back(
                 "the standard errors of the 30 coefficients are without --noise-per-g");
@@ -464,6 +458,12 @@ Vec3 to_readings(const estimator::Settings& rig, const Vec3& at) {
 
 Vec3 to_attitude(const estimator::Settings& rig, const Vec3& at) {
     return counts_as_gimbals(rig) ? at : planning::attitude_of(rig, at);
+}
+
+planning::Timing timing_of(const PlanRequest& request, const configuration::Configuration& c) {
+    return {request.dwell_s.value_or(c.campaign.dwell_s),
+            request.settle_s.value_or(c.campaign.settle_s),
+            request.ramp_s.value_or(c.campaign.ramp_s), request.slew_deg_per_s};
 }
 
 PlanStudy study(const PlanRequest& request) { return Study(request).run(); }

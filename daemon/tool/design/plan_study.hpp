@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/plan/forecast.hpp"
 #include "daemon/plan/plan_file.hpp"
 #include "daemon/results/text_line.hpp"
@@ -130,6 +131,14 @@ struct PlanStudy {
 /// Files and people have gimbal angles, a visit has what the encoders show; deg.
 [[nodiscard]] planning::Vec3 to_readings(const estimator::Settings& rig, const planning::Vec3& at);
 [[nodiscard]] planning::Vec3 to_attitude(const estimator::Settings& rig, const planning::Vec3& at);
+
+/// Of one dwell, by the request or else the configuration.
+[[nodiscard]] planning::Timing timing_of(const PlanRequest& request,
+                                         const configuration::Configuration& c);
+/// Between samples, s.
+[[nodiscard]] inline double period_of(const configuration::Configuration& c) {
+    return static_cast<double>(c.assembler.sample_period) * 1e-9;
+}
 
 /// Throws std::runtime_error for bad input.
 [[nodiscard]] PlanStudy study(const PlanRequest& request);

@@ -5,7 +5,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "daemon/configuration/configuration.hpp"
 #include "daemon/results/spectrum_json.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/design/plan_study.hpp"
@@ -34,9 +33,7 @@ class SurveyPlan {
   public:
     explicit SurveyPlan(const PlanRequest& request)
         : request_(request), c_(configuration::load(request.config, false).configuration) {
-        timing_ = {request.dwell_s.value_or(c_.campaign.dwell_s),
-                   request.settle_s.value_or(c_.campaign.settle_s),
-                   request.ramp_s.value_or(c_.campaign.ramp_s), request.slew_deg_per_s};
+        timing_ = timing_of(request, c_);
         choose_mount();
     }
 
@@ -89,11 +86,8 @@ class SurveyPlan {
                                        (std::numbers::pi / 180));
         }
         task_.settings = c_.estimator;
-        task_.rate_variance = estimator::rate_variance(c_.estimator, timing_.dwell_s, period());
-    }
-
-    [[nodiscard]] double period() const {
-        return static_cast<double>(c_.assembler.sample_period) * 1e-9;
+        task_.rate_variance =
+            estimator::rate_variance(c_.estimator, timing_.dwell_s, period_of(c_));
     }
 
     void choose_profile() {
@@ -156,8 +150,9 @@ class SurveyPlan {
     void add_resonances(std::vector<double>& listed) {
         const std::string& path = request_.survey.about;
         if (path.empty()) return;
-        about_ = spectrum::about_resonances(read_model(proto::read_json(path), path).mixture,
-                                            {1 / period(), c_.estimator.level_window_s}, listed);
+        about_ =
+            spectrum::about_resonances(read_model(proto::read_json(path), path).mixture,
+                                       {1 / period_of(c_), c_.estimator.level_window_s}, listed);
         for (const double hz : spectrum::frequencies_of(about_)) {
             if (std::ranges::find(listed, hz) == listed.end()) listed.push_back(hz);
         }
@@ -198,9 +193,9 @@ class SurveyPlan {
         const spectrum::TableLimits limits{
             c_.campaign.max_acceleration_g, c_.campaign.max_velocity_mps,
             c_.campaign.max_displacement_mm, c_.estimator.gravity_mps2};
-        task_.lines =
-            spectrum::survey_lines(spectrum::survey_frequencies(listed, highest), level,
-                                   {1 / period(), c_.estimator.level_window_s}, mount_, limits);
+        task_.lines = spectrum::survey_lines(spectrum::survey_frequencies(listed, highest), level,
+                                             {1 / period_of(c_), c_.estimator.level_window_s},
+                                             mount_, limits);
         // The nearest free one may lie beyond.
         std::erase_if(task_.lines, [this](const auto& line) {
             if (!sees(line.hz)) tell_unseen(line.hz);
@@ -210,7 +205,7 @@ class SurveyPlan {
             throw std::runtime_error(
                 "--frequencies: found none that the accelerometers see half of");
         for (const auto& line : task_.lines) {
-            const double rate = 1 / period();
+            const double rate = 1 / period_of(c_);
             const bool bad = spectrum::forbidden(line.asked_hz, rate, c_.estimator.level_window_s);
             if (line.hz != line.asked_hz)
                 warnings_.push_back(
