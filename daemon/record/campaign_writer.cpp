@@ -1,9 +1,11 @@
 #include "daemon/record/campaign_writer.hpp"
 
-#include <algorithm>
+#include <spdlog/fmt/fmt.h>
+
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "daemon/record/campaign_columns.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -17,54 +19,24 @@ using hdf5::Table;
 
 namespace {
 
-constexpr std::size_t kN = estimator::kParameters;
-constexpr std::size_t kTerms = kN / 3;
-
-template <typename T, std::size_t N>
-void put(Table& table, const std::array<T, N>& values) {
-    table.put_bytes(values.data(), sizeof values);
-}
-
-std::uint8_t byte(bool value) { return value ? 1 : 0; }
-
-/// What the dwell says of the coefficients, all in numbers.
-void put_row(Table& table, const std::optional<estimator::DwellRow>& of) {
-    std::array<double, 3> rate{}, ramp{}, ramp_sigma{};
-    std::array<double, 9> covariance{};
-    std::array<double, kN> regressors{};
-    estimator::LevelTensor gamma{};
-    double middle_s = 0, sync = 0;
-    if (of) {
-        middle_s = of->middle_s;
-        sync = of->sync_arcsec;
-        gamma = of->vibration.gamma;
-        for (std::size_t j = 0; j < 3; ++j) {
-            const auto g = static_cast<Eigen::Index>(j);
-            rate[j] = of->rate[g];
-            ramp[j] = of->ramp[g];
-            ramp_sigma[j] = std::sqrt(of->ramp_variance(g, g));
-            for (std::size_t k = 0; k < 3; ++k)
-                covariance[3 * j + k] = of->variance(g, static_cast<Eigen::Index>(k));
-            for (std::size_t t = 0; t < kTerms; ++t)
-                regressors[kTerms * j + t] = of->regressors(
-                    g, static_cast<Eigen::Index>(estimator::internal_of(kTerms * j + t) / 3));
-        }
-    } else {
-        const double none = std::nan("");
-        middle_s = sync = none;
-        for (auto* values : {&rate, &ramp, &ramp_sigma}) values->fill(none);
-        covariance.fill(none);
-        regressors.fill(none);
-        gamma.fill(none);
+DwellNumbers numbers_of(const estimator::DwellRow& row) {
+    constexpr std::size_t kTerms = estimator::kParameters / 3;
+    DwellNumbers numbers;
+    numbers.middle_s = row.middle_s;
+    numbers.sync_arcsec = row.sync_arcsec;
+    numbers.gamma = row.vibration.gamma;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Eigen::Index>(j);
+        numbers.rate[j] = row.rate[g];
+        numbers.ramp[j] = row.ramp[g];
+        numbers.ramp_sigma[j] = std::sqrt(row.ramp_variance(g, g));
+        for (std::size_t k = 0; k < 3; ++k)
+            numbers.rate_covariance[3 * j + k] = row.variance(g, static_cast<Eigen::Index>(k));
+        for (std::size_t t = 0; t < kTerms; ++t)
+            numbers.rate_regressors[kTerms * j + t] = row.regressors(
+                g, static_cast<Eigen::Index>(estimator::internal_of(kTerms * j + t) / 3));
     }
-    table.put(middle_s);
-    put(table, rate);
-    put(table, covariance);
-    put(table, regressors);
-    put(table, ramp);
-    put(table, ramp_sigma);
-    put(table, gamma);
-    table.put(sync);
+    return numbers;
 }
 
 /// For programs that read no attributes, such as GNU Octave. Numbers of 64 bits are texts: few keep
@@ -94,14 +66,6 @@ std::string new_file(const std::string& path) {
 
 }  // namespace
 
-void put_sample(Table& table, const drivers::Sample& sample) {
-    table.put(sample.time).put(sample.sequence).put(sample.dropped_before);
-    put(table, sample.angle);
-    put(table, sample.force);
-    table.put(sample.table_accel);
-    table.put_bytes(sample.quality.data(), drivers::kChannels);
-}
-
 void write_end(File& file, const Ended& ended) {
     file.set("/", "state", ended.state);
     file.set("/", "reason", ended.reason);
@@ -116,11 +80,6 @@ void write_end(File& file, const Ended& ended) {
                     "how it ended, JSON, as in the attributes");
 }
 
-void put_gap(Table& table, const Gap& gap) {
-    table.put(gap.from).put(gap.to).put(std::string_view(gap.stream)).put(gap.lost);
-    table.put(std::string_view(gap.reason));
-}
-
 CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     : file_(std::make_unique<File>(File::create(new_file(path)))),
       lock_(std::make_unique<WriterLock>(file_->path())),
@@ -132,19 +91,24 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
         for (const ColumnSpec& column : columns) units[name + 1][column.name] = column.unit;
         return std::make_unique<Table>(*file_, name, std::move(columns), chunk, description);
     };
-    samples_ = table("/samples", sample_columns(), 1024, "one row for each instant of the rig");
-    orders_ = table("/orders", order_columns(), 16, "dwells as they were ordered");
-    dwells_ = table("/dwells", dwell_columns(), 4, "dwells done");
-    sweeps_ = table("/sweeps", swept_columns(), 256,
+    ConditionRow condition;
+    condition.interlock_value.resize(interlock_rows_);
+    condition.interlock_raised.resize(interlock_rows_);
+    samples_ =
+        table("/samples", specs_of(drivers::Sample{}), 1024, "one row for each instant of the rig");
+    orders_ = table("/orders", specs_of(Order{}), 16, "dwells as they were ordered");
+    dwells_ = table("/dwells", specs_of(Dwell{}, DwellNumbers{}), 4, "dwells done");
+    sweeps_ = table("/sweeps", specs_of(SweptRow{}), 256,
                     "frequency in sweeps as the controller said it; between two rows its logarithm "
                     "goes straight");
-    played_ = table("/played", played_columns(), 16, "random dwells as they were played");
-    psd_lines_ = table("/psd_lines", psd_columns(), 256, "the controller's PSDs of random dwells");
-    estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
-    events_ = table("/events", event_columns(), 16, "what happened");
-    gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
-    conditions_ = table("/conditions", condition_columns(interlock_rows_), 64,
-                        "around the measurement, once a second");
+    played_ = table("/played", specs_of(Played{}), 16, "random dwells as they were played");
+    psd_lines_ =
+        table("/psd_lines", specs_of(PsdLine{}), 256, "the controller's PSDs of random dwells");
+    estimates_ = table("/estimates", specs_of(EstimateRow{}), 64, "the filter while it works");
+    events_ = table("/events", specs_of(EventRecord{}), 16, "what happened");
+    gaps_ = table("/gaps", specs_of(Gap{}), 16, "what is missing in this recording");
+    conditions_ =
+        table("/conditions", specs_of(condition), 64, "around the measurement, once a second");
     file_->write_text("/head", head_json(head, units), "some of the attributes, and units, JSON");
     file_->start_swmr(path);
 }
@@ -155,26 +119,17 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "description",
                "Identification of the gyro error coefficients of an inertial platform on a "
                "vibration rig");
-    file_->set("/", "name", head.name);
-    file_->set("/", "started_by", head.started_by);
-    file_->set("/", "started_utc_ns", head.utc_ns);
-    file_->set("/", "utc_offset_ns", head.utc_offset_ns);
-    file_->set("/", "clock", head.clock);
-    file_->set("/", "simulated", static_cast<std::int64_t>(head.simulated));
-    file_->set("/", "version", head.version);
-    file_->set("/", "compiler", head.compiler);
-    file_->set("/", "instruction_set", head.instruction_set);
-    file_->set("/", "configuration_hash", head.configuration_hash);
-    file_->set("/", "campaign", head.campaign);
-    file_->set("/", "part", static_cast<std::int64_t>(head.part));
-    file_->set("/", "restart", static_cast<std::int64_t>(head.restart));
-    file_->set("/", "dwells_before", static_cast<std::int64_t>(head.dwells_before));
+    attributes_of(head, [this](const char* name, const auto& field) {
+        if constexpr (std::is_integral_v<std::remove_cvref_t<decltype(field)>>) {
+            file_->set("/", name, static_cast<std::int64_t>(field));
+        } else {
+            file_->set("/", name, field);
+        }
+    });
     file_->set("/", "state", "running");
     if (!head.journal_head.empty()) file_->set("/", "journal_head", head.journal_head);
-    std::string names;
-    for (const char* name : estimator::parameter_names())
-        names += (names.empty() ? "" : " ") + std::string(name);
-    file_->set("/", "coefficients", names);
+    file_->set("/", "coefficients",
+               fmt::format("{}", fmt::join(estimator::parameter_names(), " ")));
     file_->write_text("/configuration", head.configuration, "effective configuration, TOML");
     file_->write_text("/dbc", head.dbc, "signals on the bus");
     file_->write_text("/interlocks", head.interlocks, "rows of the interlock's table, JSON");
@@ -182,99 +137,43 @@ void CampaignWriter::write_head(const Head& head) {
     file_->write_text("/plan", head.plan, "positions (deg) and levels at the table (g), JSON");
 }
 
-void CampaignWriter::order(const Order& order) {
-    orders_->put(order.announced).put(order.from).put(order.to);
-    orders_->put(std::int32_t{order.run}).put(std::int32_t{order.position}).put(order.table_g);
-    orders_->put(byte(order.cancel));
-    put(*orders_, order.zero_g);
-    orders_->put(order.level_sigma_g).put(order.noise.angle_arcsec);
-    put(*orders_, order.noise.gyro_random_walk_deg_per_rt_h);
-    orders_->put(order.begin_s).put(byte(order.power_lost));
-    orders_->put(order.frequency_hz).put(byte(order.held_out));
-    const auto& random = order.random;
-    orders_->put(std::int32_t{random.profile}).put(random.level_db).put(random.mean_square_g2);
-    orders_->put(random.bandwidth_hz).put(random.gain_error).put(random.highest_hz);
-    orders_->put(order.sweep.from_hz).put(order.sweep.to_hz).put(order.sweep.seconds);
+void CampaignWriter::put(const Swept& swept) {
+    for (const SweptRow& row : swept.rows) put_row(*sweeps_, row);
 }
 
-void CampaignWriter::swept(const Swept& swept) {
-    for (const SweptRow& row : swept.rows)
-        sweeps_->put(row.time).put(row.run).put(row.position).put(row.frequency_hz);
+void CampaignWriter::put(const Played& played) {
+    put_row(*played_, played);
+    for (const auto& [hz, density] : played.psd)
+        put_row(*psd_lines_, PsdLine{played.from, hz, density});
 }
 
-void CampaignWriter::played(const Played& played) {
-    const auto& [word, random, seen, place] = played.random;
-    played_->put(played.from).put(played.run).put(played.position);
-    played_->put(static_cast<std::uint8_t>(word)).put(random.mean_square_g2);
-    played_->put(random.bandwidth_hz).put(random.gain_error).put(random.highest_hz);
-    played_->put(seen.share).put(seen.error);
-    for (const auto& [hz, density] : played.psd) psd_lines_->put(played.from).put(hz).put(density);
+void CampaignWriter::put(const Dwell& dwell) {
+    Dwell whole = dwell;
+    whole.covariance.resize(estimator::kParameters * estimator::kParameters);
+    put_row(*dwells_, whole, dwell.row ? numbers_of(*dwell.row) : DwellNumbers{});
 }
 
-void CampaignWriter::dwell(const Dwell& dwell) {
-    const auto& s = dwell.summary;
-    dwells_->put(dwell.time).put(std::int32_t{s.run}).put(std::int32_t{s.position});
-    dwells_->put(s.samples).put(s.used).put(s.rejected).put(s.reinitialised);
-    dwells_->put(s.kappa).put(s.amplitude_g).put(s.frequency_hz).put(s.mean_force_g);
-    dwells_->put(s.nis_per_dof).put(s.innovation_correlation).put(byte(s.flagged));
-    dwells_->put(std::string_view(dwell.reason));
-    put(*dwells_, dwell.value);
-    put(*dwells_, dwell.sigma);
-    std::array<std::uint8_t, kN> observable{};
-    std::ranges::transform(dwell.observable, observable.begin(), byte);
-    put(*dwells_, observable);
-    std::vector<double> covariance = dwell.covariance;
-    covariance.resize(kN * kN);
-    dwells_->put_bytes(covariance.data(), covariance.size() * sizeof(double));
-    put_row(*dwells_, dwell.row);
+void CampaignWriter::put(const ConditionRow& row) {
+    ConditionRow whole = row;
+    whole.interlock_value.resize(interlock_rows_, std::nan(""));
+    whole.interlock_raised.resize(interlock_rows_);
+    put_row(*conditions_, whole);
 }
 
-void CampaignWriter::estimate(const EstimateRow& row) {
-    estimates_->put(row.time).put(row.amplitude_g).put(row.frequency_hz).put(row.kappa);
-    estimates_->put(row.nis_per_dof);
-    put(*estimates_, row.innovation_arcsec);
-    put(*estimates_, row.value);
-    put(*estimates_, row.sigma);
-}
-
-void CampaignWriter::condition(const ConditionRow& row) {
-    const auto put_flag = [this](int flag) { conditions_->put(std::int32_t{flag}); };
-    conditions_->put(row.time).put(row.temperature_c);
-    put(*conditions_, row.sensor_c);
-    conditions_->put(row.command_g).put(row.command_hz).put(row.set_point_g);
-    conditions_->put(row.set_point_hz).put(row.measured_g);
-    conditions_->put(row.witness_platform_g).put(row.witness_table_g).put(row.shaker_state);
-    for (const int flag : {int{row.shaker_running}, int{row.emergency_stop_open}, int{row.ready},
-                           int{row.loop_closed}, int{row.gyros_at_speed}, int{row.fault},
-                           int{row.in_position}, int{row.slewing}})
-        put_flag(flag);
-    if (interlock_rows_ == 0) return;
-    std::vector<double> value = row.interlock_value;
-    value.resize(interlock_rows_, std::nan(""));
-    std::vector<std::uint8_t> raised = row.interlock_raised;
-    raised.resize(interlock_rows_);
-    conditions_->put_bytes(value.data(), value.size() * sizeof(double));
-    conditions_->put_bytes(raised.data(), raised.size());
-}
-
-void CampaignWriter::event(const EventRecord& event) {
-    events_->put(event.time).put(event.utc_ns).put(std::string_view(name_of(event.severity)));
-    events_->put(std::string_view(event.source)).put(std::string_view(event.text));
-}
+void CampaignWriter::put(const drivers::Sample& sample) { put_row(*samples_, sample); }
+void CampaignWriter::put(const Order& order) { put_row(*orders_, order); }
+void CampaignWriter::put(const EstimateRow& row) { put_row(*estimates_, row); }
+void CampaignWriter::put(const EventRecord& event) { put_row(*events_, event); }
+void CampaignWriter::put(const Gap& gap) { put_row(*gaps_, gap); }
 
 void CampaignWriter::commit() {
-    // Samples last: whoever sees a sample also sees the order that it belongs to.
-    for (auto* table : {&orders_, &dwells_, &sweeps_, &played_, &psd_lines_, &estimates_, &events_,
-                        &gaps_, &conditions_, &samples_})
-        (*table)->commit();
+    for (auto* table : tables()) (*table)->commit();
     file_->flush();
 }
 
 void CampaignWriter::end(const Ended& ended) {
     commit();
-    for (auto* table : {&orders_, &dwells_, &sweeps_, &played_, &psd_lines_, &estimates_, &events_,
-                        &gaps_, &conditions_, &samples_})
-        table->reset();
+    for (auto* table : tables()) table->reset();
     const std::string path = file_->path();
     file_->close();
     // While a file is written with readers, no attribute can be added.

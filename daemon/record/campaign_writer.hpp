@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 
@@ -12,9 +13,6 @@ namespace vibrig::record {
 
 inline constexpr std::int64_t kFormatVersion = 2;
 
-/// Rows, for writing and for mending.
-void put_sample(hdf5::Table& table, const drivers::Sample& sample);
-void put_gap(hdf5::Table& table, const Gap& gap);
 /// How a campaign, or this file of it, ended; but for its result. Of a closed file.
 void write_end(hdf5::File& file, const Ended& ended);
 
@@ -24,15 +22,15 @@ class CampaignWriter {
   public:
     CampaignWriter(const std::string& path, const Head& head);
 
-    void sample(const drivers::Sample& sample) { put_sample(*samples_, sample); }
-    void order(const Order& order);
-    void dwell(const Dwell& dwell);
-    void swept(const Swept& swept);
-    void played(const Played& played);
-    void estimate(const EstimateRow& row);
-    void event(const EventRecord& event);
-    void condition(const ConditionRow& row);
-    void gap(const Gap& gap) { put_gap(*gaps_, gap); }
+    void put(const drivers::Sample& sample);
+    void put(const Order& order);
+    void put(const Dwell& dwell);
+    void put(const Swept& swept);
+    void put(const Played& played);
+    void put(const EstimateRow& row);
+    void put(const EventRecord& event);
+    void put(const ConditionRow& row);
+    void put(const Gap& gap);
 
     void commit();
     /// Writes how it ended and closes the file.
@@ -43,6 +41,11 @@ class CampaignWriter {
 
   private:
     void write_head(const Head& head);
+    /// Samples last: whoever sees a sample also sees the order that it belongs to.
+    [[nodiscard]] auto tables() {
+        return std::array{&orders_,    &dwells_, &sweeps_, &played_,     &psd_lines_,
+                          &estimates_, &events_, &gaps_,   &conditions_, &samples_};
+    }
 
     std::unique_ptr<hdf5::File> file_;
     std::unique_ptr<WriterLock> lock_;

@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <functional>
+#include <numeric>
 #include <utility>
 
 namespace vibrig::record::hdf5 {
@@ -72,20 +74,6 @@ std::int64_t native(Type type) {
     return H5T_NATIVE_UINT8;
 }
 
-std::size_t bytes_of(Type type) {
-    switch (type) {
-        case Type::f64:
-        case Type::i64:
-        case Type::u64:
-            return 8;
-        case Type::i32:
-        case Type::u32:
-            return 4;
-        default:
-            return 1;
-    }
-}
-
 /// Ends with a zero only where there is room, as h5py, Octave and MATLAB take it.
 Handle text_type(std::size_t size) {
     Handle type(H5Tcopy(H5T_C_S1), close_type);
@@ -128,12 +116,17 @@ Handle access_list(std::size_t metadata_bytes) {
     return list;
 }
 
-std::vector<std::size_t> dimensions_of(std::int64_t set) {
-    const Handle space(H5Dget_space(set), close_space);
+std::vector<std::size_t> dimensions_of(const Handle& set) {
+    const Handle space(H5Dget_space(set.get()), close_space);
     const int rank = H5Sget_simple_extent_ndims(space.get());
     std::vector<hsize_t> found(static_cast<std::size_t>(std::max(rank, 0)));
     H5Sget_simple_extent_dims(space.get(), found.data(), nullptr);
     return {found.begin(), found.end()};
+}
+
+/// Of values in an array of those dimensions.
+std::size_t count_of(const std::vector<std::size_t>& dimensions) {
+    return std::accumulate(dimensions.begin(), dimensions.end(), std::size_t{1}, std::multiplies{});
 }
 
 }  // namespace
@@ -266,21 +259,22 @@ std::int64_t File::number(const std::string& object, const char* name) const {
     return number;
 }
 
+void File::write_set(const std::string& name, const Handle& space, std::int64_t type,
+                     const void* values) {
+    if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
+    const Handle made(H5Dcreate2(file_.get(), name.c_str(), type, space.get(), H5P_DEFAULT,
+                                 H5P_DEFAULT, H5P_DEFAULT),
+                      close_set);
+    if (made.get() < 0 || H5Dwrite(made.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
+        fail(name);
+}
+
 void File::write_text(const std::string& name, std::string_view text,
                       std::string_view description) {
-    if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
     std::string padded(text);
     padded.resize(std::max<std::size_t>(text.size(), 1));
-    const Handle type = text_type(padded.size());
-    {
-        const Handle space(H5Screate(H5S_SCALAR), close_space);
-        const Handle made(H5Dcreate2(file_.get(), name.c_str(), type.get(), space.get(),
-                                     H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                          close_set);
-        if (made.get() < 0 ||
-            H5Dwrite(made.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0)
-            fail(name);
-    }
+    write_set(name, Handle(H5Screate(H5S_SCALAR), close_space), text_type(padded.size()).get(),
+              padded.data());
     set(name, "description", description);
 }
 
@@ -292,32 +286,27 @@ std::string File::read_text(const std::string& name) const {
 void File::write_numbers(const std::string& name, std::span<const double> values,
                          const std::vector<std::size_t>& dimensions, std::string_view unit,
                          std::string_view description) {
-    if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
-    {
-        const std::vector<hsize_t> size(dimensions.begin(), dimensions.end());
-        const Handle space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
-                           close_space);
-        const Handle made(H5Dcreate2(file_.get(), name.c_str(), H5T_IEEE_F64LE, space.get(),
-                                     H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                          close_set);
-        if (made.get() < 0 || H5Dwrite(made.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                                       values.data()) < 0)
-            fail(name);
-    }
+    const std::vector<hsize_t> size(dimensions.begin(), dimensions.end());
+    write_set(
+        name,
+        Handle(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), close_space),
+        H5T_NATIVE_DOUBLE, values.data());
     set(name, "unit", unit);
     set(name, "description", description);
 }
 
+Handle File::open_set(const std::string& name) const {
+    Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
+    if (set.get() < 0) fail(name);
+    return set;
+}
+
 template <typename T>
 Array<T> File::read(const std::string& name, std::int64_t type) const {
-    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
-    if (set.get() < 0) fail(name);
-    Array<T> array;
-    array.dimensions = dimensions_of(set.get());
-    std::size_t count = 1;
-    for (const std::size_t d : array.dimensions) count *= d;
-    array.values.resize(count);
-    if (count > 0 &&
+    const Handle set = open_set(name);
+    Array<T> array{dimensions_of(set), {}};
+    array.values.resize(count_of(array.dimensions));
+    if (!array.values.empty() &&
         H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()) < 0)
         fail(name);
     return array;
@@ -331,14 +320,12 @@ Array<std::int64_t> File::integers(const std::string& name) const {
 }
 
 std::vector<std::string> File::texts(const std::string& name) const {
-    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
-    if (set.get() < 0) fail(name);
+    const Handle set = open_set(name);
     const Handle type(H5Dget_type(set.get()), close_type);
     if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
         throw Error(path_ + ": " + name + ": found no texts of fixed size, expected them");
     const std::size_t size = H5Tget_size(type.get());
-    std::size_t count = 1;
-    for (const std::size_t d : dimensions_of(set.get())) count *= d;
+    const std::size_t count = count_of(dimensions_of(set));
     std::string all(size * count, '\0');
     if (count > 0 && H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0)
         fail(name);
@@ -351,20 +338,11 @@ std::vector<std::string> File::texts(const std::string& name) const {
     return texts;
 }
 
-std::size_t File::rows(const std::string& name) const {
-    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
-    if (set.get() < 0) fail(name);
-    const auto dimensions = dimensions_of(set.get());
-    return dimensions.empty() ? 0 : dimensions[0];
+std::vector<std::size_t> File::dimensions(const std::string& name) const {
+    return dimensions_of(open_set(name));
 }
 
 namespace {
-
-std::size_t row_size(const ColumnSpec& spec) {
-    std::size_t bytes = bytes_of(spec.type);
-    for (const std::size_t d : spec.shape) bytes *= d;
-    return bytes;
-}
 
 /// What a dying disk did not take must not look like a measurement: no number, no time, and a
 /// quality that is not good.
@@ -384,13 +362,9 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std
     file.make_group(group_);
     file.set(group_, "description", description);
     for (auto& spec : columns) {
-        Column column;
-        column.bytes = row_size(spec);
-        const bool text = spec.type == Type::text;
-        column.type =
-            text ? text_type(column.bytes) : Handle(H5Tcopy(native(spec.type)), close_type);
+        Column& column = add(std::move(spec));
         std::vector<hsize_t> size{0}, most{H5S_UNLIMITED}, chunk{chunk_rows};
-        for (const std::size_t d : text ? std::vector<std::size_t>{} : spec.shape) {
+        for (const std::size_t d : column.spec.shape) {
             size.push_back(d);
             most.push_back(d);
             chunk.push_back(d);
@@ -399,82 +373,70 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std
             H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), close_space);
         const Handle list(H5Pcreate(H5P_DATASET_CREATE), close_list);
         H5Pset_chunk(list.get(), static_cast<int>(chunk.size()), chunk.data());
-        set_fill(list.get(), spec.type);
-        const std::string name = group_ + "/" + spec.name;
-        column.dataset = Handle(H5Dcreate2(file.id(), name.c_str(), column.type.get(), space.get(),
-                                           H5P_DEFAULT, list.get(), H5P_DEFAULT),
+        set_fill(list.get(), column.spec.type);
+        column.dataset = Handle(H5Dcreate2(file.id(), column.name.c_str(), column.type.get(),
+                                           space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT),
                                 close_set);
-        if (column.dataset.get() < 0) file.fail(name);
-        if (*spec.unit != '\0') file.set(name, "unit", spec.unit);
-        file.set(name, "description", spec.description);
-        column.spec = std::move(spec);
-        columns_.push_back(std::move(column));
+        if (column.dataset.get() < 0) file.fail(column.name);
+        if (*column.spec.unit != '\0') file.set(column.name, "unit", column.spec.unit);
+        file.set(column.name, "description", column.spec.description);
     }
 }
 
 Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns)
     : file_(&file), group_(std::move(group)) {
     for (auto& spec : columns) {
-        Column column;
-        column.bytes = row_size(spec);
-        const std::string name = group_ + "/" + spec.name;
-        column.dataset = Handle(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT), close_set);
-        if (column.dataset.get() < 0) file.fail(name);
-        column.type = spec.type == Type::text ? text_type(column.bytes)
-                                              : Handle(H5Tcopy(native(spec.type)), close_type);
-        rows_ = dimensions_of(column.dataset.get()).at(0);
-        column.spec = std::move(spec);
-        columns_.push_back(std::move(column));
+        Column& column = add(std::move(spec));
+        column.dataset = file.open_set(column.name);
+        rows_ = dimensions_of(column.dataset).at(0);
     }
+}
+
+Table::Column& Table::add(ColumnSpec spec) {
+    Column& column = columns_.emplace_back();
+    column.name = group_ + "/" + spec.name;
+    column.type = spec.type == Type::text ? text_type(spec.text_bytes)
+                                          : Handle(H5Tcopy(native(spec.type)), close_type);
+    column.bytes = count_of(spec.shape) * H5Tget_size(column.type.get());
+    column.spec = std::move(spec);
+    return column;
 }
 
 void Table::keep(std::size_t rows) {
     for (Column& column : columns_) {
-        const auto found = dimensions_of(column.dataset.get());
+        const auto found = dimensions_of(column.dataset);
         std::vector<hsize_t> size(found.begin(), found.end());
         size.at(0) = std::min<hsize_t>(size.at(0), rows);
-        if (H5Dset_extent(column.dataset.get(), size.data()) < 0)
-            file_->fail(group_ + "/" + column.spec.name);
+        if (H5Dset_extent(column.dataset.get(), size.data()) < 0) file_->fail(column.name);
     }
     rows_ = rows;
 }
 
-void Table::cell(const void* value, std::size_t size) {
+void Table::put(const void* cell, std::size_t size) {
     Column& column = columns_[next_];
-    if (size != column.bytes)
-        throw std::logic_error(group_ + "/" + column.spec.name + ": a cell of another size");
-    const auto* bytes = static_cast<const unsigned char*>(value);
+    if (size != column.bytes) throw std::logic_error(column.name + ": a cell of another size");
+    const auto* bytes = static_cast<const unsigned char*>(cell);
     column.buffer.insert(column.buffer.end(), bytes, bytes + size);
     next_ = (next_ + 1) % columns_.size();
     if (next_ == 0) ++waiting_;
 }
 
-Table& Table::put(std::string_view text) {
+void Table::put(std::string_view text) {
     std::string padded(text.substr(0, columns_[next_].bytes));
     padded.resize(columns_[next_].bytes);
-    cell(padded.data(), padded.size());
-    return *this;
-}
-
-std::size_t Table::row_bytes() const noexcept {
-    std::size_t bytes = 0;
-    for (const Column& column : columns_) bytes += column.bytes;
-    return bytes;
+    put(padded.data(), padded.size());
 }
 
 void Table::commit() {
     if (waiting_ == 0) return;
     for (Column& column : columns_) {
         std::vector<hsize_t> start{rows_}, count{waiting_}, size{rows_ + waiting_};
-        if (column.spec.type != Type::text) {
-            for (const std::size_t d : column.spec.shape) {
-                start.push_back(0);
-                count.push_back(d);
-                size.push_back(d);
-            }
+        for (const std::size_t d : column.spec.shape) {
+            start.push_back(0);
+            count.push_back(d);
+            size.push_back(d);
         }
-        const std::string name = group_ + "/" + column.spec.name;
-        if (H5Dset_extent(column.dataset.get(), size.data()) < 0) file_->fail(name);
+        if (H5Dset_extent(column.dataset.get(), size.data()) < 0) file_->fail(column.name);
         const Handle in_file(H5Dget_space(column.dataset.get()), close_space);
         H5Sselect_hyperslab(in_file.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(),
                             nullptr);
@@ -482,7 +444,7 @@ void Table::commit() {
             H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), close_space);
         if (H5Dwrite(column.dataset.get(), column.type.get(), in_memory.get(), in_file.get(),
                      H5P_DEFAULT, column.buffer.data()) < 0)
-            file_->fail(name);
+            file_->fail(column.name);
         column.buffer.clear();
     }
     rows_ += waiting_;

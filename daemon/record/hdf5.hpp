@@ -44,7 +44,6 @@ template <typename T>
 struct Array {
     std::vector<std::size_t> dimensions;
     std::vector<T> values;
-    [[nodiscard]] std::size_t rows() const { return dimensions.empty() ? 0 : dimensions[0]; }
 };
 
 /// One file; one thread at a time. Everything throws Error.
@@ -80,15 +79,18 @@ class File {
     [[nodiscard]] Array<double> doubles(const std::string& name) const;
     [[nodiscard]] Array<std::int64_t> integers(const std::string& name) const;
     [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
-    [[nodiscard]] std::size_t rows(const std::string& name) const;
+    [[nodiscard]] std::vector<std::size_t> dimensions(const std::string& name) const;
 
     [[nodiscard]] std::int64_t id() const noexcept { return file_.get(); }
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
+    [[nodiscard]] Handle open_set(const std::string& name) const;
     [[noreturn]] void fail(const std::string& object) const;
 
   private:
     void attribute(const std::string& object, const char* name, std::int64_t type,
                    const void* value);
+    void write_set(const std::string& name, const Handle& space, std::int64_t type,
+                   const void* values);
     template <typename T>
     Array<T> read(const std::string& name, std::int64_t type) const;
 
@@ -100,7 +102,8 @@ class File {
 struct ColumnSpec {
     const char* name;
     Type type;
-    std::vector<std::size_t> shape;  ///< of one row; text: its bytes; empty: one number
+    std::size_t text_bytes;          ///< of a text
+    std::vector<std::size_t> shape;  ///< of one row of numbers; empty: one
     const char* unit;                ///< empty: none
     const char* description;
 };
@@ -114,36 +117,23 @@ class Table {
     Table(File& file, std::string group, std::vector<ColumnSpec> columns);
 
     /// Cells of a row in the order of the columns.
-    template <typename T>
-    Table& put(const T& value) {
-        cell(&value, sizeof value);
-        return *this;
-    }
-    template <typename T, std::size_t N>
-    Table& put(const T (&values)[N]) {
-        cell(values, sizeof values);
-        return *this;
-    }
-    Table& put(std::string_view text);
-    Table& put_bytes(const void* bytes, std::size_t size) {
-        cell(bytes, size);
-        return *this;
-    }
+    void put(const void* cell, std::size_t bytes);
+    void put(std::string_view text);
     void commit();
     /// Forgets the rows behind the first `rows`, which every column has.
     void keep(std::size_t rows);
     [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
-    [[nodiscard]] std::size_t written() const noexcept { return rows_; }
-    [[nodiscard]] std::size_t row_bytes() const noexcept;
 
   private:
     struct Column {
         ColumnSpec spec;
+        std::string name;       ///< in the file
         std::size_t bytes = 0;  ///< of one row
         Handle dataset, type;
         std::vector<unsigned char> buffer;
     };
-    void cell(const void* value, std::size_t size);
+    /// With no dataset yet.
+    Column& add(ColumnSpec spec);
 
     File* file_;
     std::string group_;

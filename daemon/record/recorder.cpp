@@ -231,7 +231,7 @@ void Recorder::take(const drivers::Sample& sample) {
         write_gap(gap);
     }
     if (writer_) {
-        writer_->sample(sample);
+        writer_->put(sample);
         ++at_risk_;
         if (writer_->samples_waiting() >= kMostRows) commit(true);
         return;
@@ -439,20 +439,14 @@ void Recorder::keep_few() {
 
 /// Throws. What the file did not take is kept for the next one.
 void Recorder::write_kept() {
-    for (const auto& entry : kept_) {
-        if (const auto* order = std::get_if<Order>(&entry)) writer_->order(*order);
-        if (const auto* dwell = std::get_if<Dwell>(&entry)) writer_->dwell(*dwell);
-        if (const auto* swept = std::get_if<Swept>(&entry)) writer_->swept(*swept);
-        if (const auto* played = std::get_if<Played>(&entry)) writer_->played(*played);
-        if (const auto* event = std::get_if<EventRecord>(&entry)) writer_->event(*event);
-    }
+    for (const auto& entry : kept_) std::visit([this](const auto& e) { writer_->put(e); }, entry);
     writer_->commit();
     kept_.clear();
 }
 
 void Recorder::write_gap(const Gap& gap) {
     ++shown_.gaps;
-    if (writer_) writer_->gap(gap);
+    if (writer_) writer_->put(gap);
 }
 
 void Recorder::look_at_estimate() {
@@ -461,15 +455,15 @@ void Recorder::look_at_estimate() {
     if (e.samples == estimate_samples_ || newest_sample_ - estimate_at_ < kEstimatePeriod) return;
     estimate_samples_ = e.samples;
     estimate_at_ = newest_sample_;
-    writer_->estimate({newest_sample_, e.amplitude_g, e.frequency_hz, e.kappa, e.nis_per_dof,
-                       e.innovation_arcsec, e.value, e.sigma});
+    writer_->put(EstimateRow{newest_sample_, e.amplitude_g, e.frequency_hz, e.kappa, e.nis_per_dof,
+                             e.innovation_arcsec, e.value, e.sigma});
 }
 
 void Recorder::look_around() {
     const Time now = clock_.now();
     if (!head_ || !writer_ || !conditions_ || now - looked_around_at_ < kConditionPeriod) return;
     looked_around_at_ = now;
-    writer_->condition(conditions_());
+    writer_->put(conditions_());
 }
 
 void Recorder::commit(bool all) {

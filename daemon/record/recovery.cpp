@@ -52,14 +52,14 @@ void mend_last(const std::string& path) {
     const Time end = more.empty() ? last_time(part) : more.back().time;
     File file = File::open(path, File::Mode::write);
     {
-        hdf5::Table samples(file, "/samples", sample_columns());
+        hdf5::Table samples(file, "/samples", specs_of(drivers::Sample{}));
         samples.keep(part.samples.size());
-        for (const auto& sample : more) put_sample(samples, sample);
+        for (const auto& sample : more) put_row(samples, sample);
         samples.commit();
-        hdf5::Table gaps(file, "/gaps", gap_columns());
+        hdf5::Table gaps(file, "/gaps", specs_of(Gap{}));
         gaps.keep(part.gaps.size());
-        if (!failure.empty()) put_gap(gaps, {end, end, "raw log", 0, failure});
-        put_gap(gaps, gap);
+        if (!failure.empty()) put_row(gaps, Gap{end, end, "raw log", 0, failure});
+        put_row(gaps, gap);
         gaps.commit();
     }
     write_end(file, {"recovered", "the recorder died before the campaign was over", "", "",
@@ -105,7 +105,7 @@ void close_part(const std::string& path, const std::string& next) {
     File::open(path, File::Mode::mend).close();
     const Campaign part = read_part(path);
     File file = File::open(path, File::Mode::write);
-    hdf5::Table(file, "/samples", sample_columns()).keep(part.samples.size());
+    hdf5::Table(file, "/samples", specs_of(drivers::Sample{})).keep(part.samples.size());
     write_end(file, {"continued", "the campaign goes on in " + next, "", "",
                      last_time(part) + part.head.utc_offset_ns});
     file.close();

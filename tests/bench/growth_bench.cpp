@@ -136,9 +136,9 @@ void make_campaign(const std::string& folder, std::size_t positions, double dwel
     });
     const auto replayed = record::replay(campaign, {}, {});
     record::CampaignWriter writer(campaign.path, campaign.head);
-    for (const auto& order : campaign.orders) writer.order(order);
-    for (const auto& sample : campaign.samples) writer.sample(sample);
-    for (const auto& one : replayed.dwells) writer.dwell(one);
+    for (const auto& order : campaign.orders) writer.put(order);
+    for (const auto& sample : campaign.samples) writer.put(sample);
+    for (const auto& one : replayed.dwells) writer.put(one);
     writer.commit();
     writer.end({"finished", "", "", "", 0});
 }
@@ -159,7 +159,7 @@ void make_recording(const std::string& folder, std::uintmax_t megabytes) {
         sample.time = static_cast<drivers::Time>(n) * kPeriod;
         for (double& angle : sample.angle) angle = 1e-9 * static_cast<double>(random());
         for (double& force : sample.force) force = 1e-9 * static_cast<double>(random());
-        writer.sample(sample);
+        writer.put(sample);
         if (n % kDwell == 0) {
             record::Order order;
             order.announced = order.from = sample.time;
@@ -167,7 +167,7 @@ void make_recording(const std::string& folder, std::uintmax_t megabytes) {
             order.run = 1 + static_cast<int>(n / kDwell / 14);
             order.position = 1 + static_cast<int>(n / kDwell % 14);
             order.table_g = 7;
-            writer.order(order);
+            writer.put(order);
         }
         if (n % kAtOnce != kAtOnce - 1) continue;
         writer.commit();

@@ -57,7 +57,7 @@ void write_sample(benchmark::State& state) {
             sample.angle[k] = 0.1 + 2.4e-5 * noise(random);
             sample.force[k] = noise(random);
         }
-        writer.sample(sample);
+        writer.put(sample);
         for (int i = 0; i < kFrames; ++i) {
             frame.frame.can_id = static_cast<canid_t>(0x100 + i);
             const auto bits = random();

@@ -80,20 +80,20 @@ class Parts : public ::testing::Test {
             sample.time = from + i * kStep;
             sample.sequence = static_cast<std::uint32_t>(i);
             sample.force = {0, 1, 0};
-            writer.sample(sample);
+            writer.put(sample);
         }
         for (std::size_t i = 0; i < orders.size(); ++i) {
             const Time at = from + static_cast<Time>(i) * 100 * kStep;
-            writer.order({at,
-                          at,
-                          at + 100 * kStep,
-                          1,
-                          orders[i],
-                          9.0,
-                          false,
-                          {},
-                          0,
-                          {5.0, {1e-3, 1e-3, 1e-3}}});
+            writer.put(Order{at,
+                             at,
+                             at + 100 * kStep,
+                             1,
+                             orders[i],
+                             9.0,
+                             false,
+                             {},
+                             0,
+                             {5.0, {1e-3, 1e-3, 1e-3}}});
             if (i >= done) continue;
             Dwell dwell;
             dwell.time = at + 100 * kStep;
@@ -101,7 +101,7 @@ class Parts : public ::testing::Test {
             dwell.summary.position = orders[i];
             dwell.summary.samples = 100;
             if (i > 0) dwell.row = row_of(orders[i]);
-            writer.dwell(dwell);
+            writer.put(dwell);
         }
         writer.end({state, "", "", "{}", head.utc_ns + kSecond});
     }

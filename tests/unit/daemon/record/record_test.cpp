@@ -65,7 +65,7 @@ class Recording : public ::testing::Test {
         return made;
     }
     static void put_order(CampaignWriter& writer, int position, Time from, Time to) {
-        writer.order({from - drivers::kSecond, from, to, 1, position, 9.0, false});
+        writer.put(Order{from - drivers::kSecond, from, to, 1, position, 9.0, false});
     }
     static std::string file(const fs::path& path) {
         std::ifstream in(path, std::ios::binary);
@@ -92,14 +92,14 @@ TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
     written[5].quality[3] = drivers::Quality::stale;
     written[6].force[1] = std::nan("");
     CampaignWriter writer(path, head());
-    for (const auto& sample : written) writer.sample(sample);
+    for (const auto& sample : written) writer.put(sample);
     put_order(writer, 1, written[100].time, written[2000].time);
-    writer.gap({1, 2, "samples", 17, "ring full"});
+    writer.put(Gap{1, 2, "samples", 17, "ring full"});
     EventRecord event;
     event.text = "Umlaut \xc3\xa4";
     event.source = "test";
     event.severity = Severity::alarm;
-    writer.event(event);
+    writer.put(event);
     writer.commit();
     for (const bool ended : {false, true}) {
         SCOPED_TRACE(ended ? "closed" : "open");
@@ -141,17 +141,17 @@ TEST_F(Recording, HasTheFrequencyOfASweepAndMakesItsBlocksAgain) {
         s.quality.fill(drivers::Quality::good);
         phase += 2 * std::numbers::pi * hz_at(i / kRate_hz) / kRate_hz;
         s.force = {0, 1 + 6 * std::sin(phase), 0};
-        writer.sample(s);
+        writer.put(s);
     }
     Order order{
         from - drivers::kSecond, from, from + drivers::from_seconds(kSweep_s), 1, 2, 6.0, false};
     order.sweep = {kFrom_hz, kTo_hz, kSweep_s};
-    writer.order(order);
+    writer.put(order);
     Swept swept;
     for (double t = -1; t <= kSweep_s + 0.5; t += 0.2)
         swept.rows.push_back({from + drivers::from_seconds(t), 1, 2, hz_at(t)});
     swept.rows.push_back({from + drivers::kSecond, 3, 2, 5});  // of another dwell
-    writer.swept(swept);
+    writer.put(swept);
     writer.commit();
     writer.end({"finished", "", "", "{}", head().utc_ns + 1});
     // WHEN it is read THEN they are there, and the accelerometers show what they say
@@ -198,8 +198,8 @@ TEST_F(Recording, HasWhatWasAroundTheMeasurement) {
     row.interlock_value = {0.25, std::nan(""), -1};
     row.interlock_raised = {0, 1, 0};
     CampaignWriter writer(path, with_rows);
-    for (const auto& sample : samples(10, 0)) writer.sample(sample);
-    writer.condition(row);
+    for (const auto& sample : samples(10, 0)) writer.put(sample);
+    writer.put(row);
     writer.commit();
     // WHEN it is read
     const Campaign read = read_campaign(path);
@@ -230,7 +230,7 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     const std::string path = (folder_ / "campaign.h5").string();
     {
         CampaignWriter writer((folder_ / "living.h5").string(), head());
-        for (const auto& sample : samples(500, 0)) writer.sample(sample);
+        for (const auto& sample : samples(500, 0)) writer.put(sample);
         put_order(writer, 3, 2 * drivers::kSecond, 100 * drivers::kSecond);
         writer.commit();
         EXPECT_THROW(static_cast<void>(recover((folder_ / "living.h5").string(), {})),

@@ -107,23 +107,23 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder,
                 sample.time = kSecond + static_cast<Time>(samples) * 25 * kMillisecond;
                 sample.sequence = static_cast<std::uint32_t>(samples);
                 sample.force = {0, 1, 0};
-                writer.sample(sample);
+                writer.put(sample);
             }
             const Time now = kSecond + static_cast<Time>(samples) * 25 * kMillisecond;
-            writer.order({now, now, now + 5 * kSecond, 1, commit + 1, 9.0, false, {}, 0, {}});
+            writer.put(Order{now, now, now + 5 * kSecond, 1, commit + 1, 9.0, false, {}, 0, {}});
             EstimateRow row;
             row.time = now;
-            writer.estimate(row);
+            writer.put(row);
             if (commit % 3 == 1) {
                 Dwell dwell;
                 dwell.time = now;
                 dwell.covariance.assign(30 * 30, 0.0);
-                writer.dwell(dwell);
+                writer.put(dwell);
                 EventRecord event;
                 event.time = now;
                 event.text = "something";
-                writer.event(event);
-                writer.gap({now, now, "samples", 0, "a test"});
+                writer.put(event);
+                writer.put(Gap{now, now, "samples", 0, "a test"});
             }
             writer.commit();
             told.emplace_back(disk.taken, samples);

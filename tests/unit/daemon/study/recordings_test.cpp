@@ -70,9 +70,9 @@ class StudyRecordings : public ::testing::Test {
                 order.run = static_cast<int>(run = from.run);
                 order.position = static_cast<int>(position = from.position);
                 order.table_g = plan.table_g[run - 1];
-                writer.order(order);
+                writer.put(order);
             }
-            writer.sample(sample);
+            writer.put(sample);
         });
         writer.end({"finished", "", "", result, head.utc_ns});
     }
