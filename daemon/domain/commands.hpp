@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -20,6 +22,13 @@ struct CommandRequest {
     std::string by;        ///< named person
     std::string argument;  ///< what is acknowledged
 };
+/// In the order of CommandRequest::Kind, as people, the interface and the journal have them.
+inline constexpr std::array<const char*, 9> kCommandWords{"arm",      "start",      "pause",
+                                                          "resume",   "abort",      "acknowledge",
+                                                          "selftest", "commission", "certificate"};
+[[nodiscard]] constexpr const char* word_of(CommandRequest::Kind kind) {
+    return kCommandWords[static_cast<std::size_t>(kind)];
+}
 struct CommandReply {
     bool accepted = false;
     std::string message;

@@ -19,31 +19,6 @@ namespace {
 constexpr auto kPeriod = std::chrono::milliseconds(200);
 constexpr auto kRetry = std::chrono::seconds(1);
 
-const char* word_of(CommandRequest::Kind kind) {
-    using Kind = CommandRequest::Kind;
-    switch (kind) {
-        case Kind::arm:
-            return "arm";
-        case Kind::start:
-            return "start";
-        case Kind::pause:
-            return "pause";
-        case Kind::resume:
-            return "resume";
-        case Kind::abort:
-            return "abort";
-        case Kind::acknowledge:
-            return "acknowledge";
-        case Kind::selftest:
-            return "selftest";
-        case Kind::commission:
-            return "commission";
-        case Kind::certificate:
-            return kCertificate;
-    }
-    return "unknown";
-}
-
 }  // namespace
 
 Journal::Journal(const std::string& path, std::uint64_t configuration_hash,

@@ -131,13 +131,6 @@ std::string asked_by(const ApiRequest& request) {
            in_quotes(request.target.substr(0, request.target.find('?')));
 }
 
-const char* word_of(CommandRequest::Kind kind) {
-    constexpr std::array<const char*, 9> kNames{"arm",      "start",      "pause",
-                                                "resume",   "abort",      "acknowledge",
-                                                "selftest", "commission", "certificate"};
-    return kNames[static_cast<std::size_t>(kind)];
-}
-
 }  // namespace
 
 const char* name_of(Role role) noexcept {

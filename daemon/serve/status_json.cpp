@@ -2,6 +2,7 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -62,31 +63,12 @@ void refuse_repeated_keys(const std::string& json) {
 }
 
 CommandRequest::Kind kind_of(v1::Command::Kind kind) {
-    switch (kind) {
-        case v1::Command::arm:
-            return CommandRequest::Kind::arm;
-        case v1::Command::start:
-            return CommandRequest::Kind::start;
-        case v1::Command::pause:
-            return CommandRequest::Kind::pause;
-        case v1::Command::resume:
-            return CommandRequest::Kind::resume;
-        case v1::Command::abort:
-            return CommandRequest::Kind::abort;
-        case v1::Command::acknowledge:
-            return CommandRequest::Kind::acknowledge;
-        case v1::Command::selftest:
-            return CommandRequest::Kind::selftest;
-        case v1::Command::commission:
-            return CommandRequest::Kind::commission;
-        case v1::Command::certificate:
-            return CommandRequest::Kind::certificate;
-        default:
-            break;
-    }
-    throw std::invalid_argument(
-        "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge, "
-        "selftest, commission or certificate");
+    const auto found = std::ranges::find(kCommandWords, v1::Command::Kind_Name(kind));
+    if (found == kCommandWords.end())
+        throw std::invalid_argument(
+            "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge, "
+            "selftest, commission or certificate");
+    return static_cast<CommandRequest::Kind>(found - kCommandWords.begin());
 }
 
 /// As to_json(), the campaign's dwells one by one: protobuf makes an object of every field before
