@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/beast/http/status.hpp>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -29,35 +30,11 @@ constexpr int kDeepestBody = 8;                 // levels of JSON; a command has
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
 
-const char* title_of(int status) {
-    switch (status) {
-        case 400:
-            return "Bad Request";
-        case 403:
-            return "Forbidden";
-        case 404:
-            return "Not Found";
-        case 405:
-            return "Method Not Allowed";
-        case 409:
-            return "Conflict";
-        case 413:
-            return "Payload Too Large";
-        case 415:
-            return "Unsupported Media Type";
-        case 421:
-            return "Misdirected Request";
-        case 426:
-            return "Upgrade Required";
-        case 429:
-            return "Too Many Requests";
-        case 431:
-            return "Request Header Fields Too Large";
-        case 503:
-            return "Service Unavailable";
-        default:
-            return "Internal Server Error";
-    }
+std::string title_of(int status) {
+    namespace http = boost::beast::http;
+    const http::status known = http::int_to_status(static_cast<unsigned>(status));
+    return std::string(http::obsolete_reason(
+        known == http::status::unknown ? http::status::internal_server_error : known));
 }
 
 /// Text of a stranger, fit for an error message.
