@@ -1,6 +1,7 @@
 #include "daemon/serve/render.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -86,21 +87,10 @@ std::string progress_line(const v1::Campaign& campaign, int width) {
 }
 
 const char* shaker_state(const v1::Shaker& shaker) {
+    constexpr std::array<const char*, 5> kStates{"idle", "ramping", "running", "stopping", "FAULT"};
     if (!shaker.has_state()) return "no reading";
-    switch (shaker.state()) {
-        case 0:
-            return "idle";
-        case 1:
-            return "ramping";
-        case 2:
-            return "running";
-        case 3:
-            return "stopping";
-        case 4:
-            return "FAULT";
-        default:
-            return "unknown state";
-    }
+    const auto state = static_cast<std::size_t>(shaker.state());
+    return state < kStates.size() ? kStates[state] : "unknown state";
 }
 
 std::string shaker_line(const v1::Status& status) {

@@ -127,24 +127,11 @@ void fill(v1::Can& out, const StatusData& status) {
     fill_values(out, "can.", status);
 }
 
+/// The schema has the states by their names.
 v1::Channel::Quality wire_state(ChannelState state) {
-    switch (state) {
-        case ChannelState::good:
-            return v1::Channel::good;
-        case ChannelState::missing:
-            return v1::Channel::missing;
-        case ChannelState::flagged:
-            return v1::Channel::flagged;
-        case ChannelState::out_of_range:
-            return v1::Channel::out_of_range;
-        case ChannelState::unbound:
-            return v1::Channel::unbound;
-        case ChannelState::silent:
-            return v1::Channel::silent;
-        case ChannelState::never:
-            break;
-    }
-    return v1::Channel::never;
+    v1::Channel::Quality quality{};
+    v1::Channel::Quality_Parse(name_of(state), &quality);
+    return quality;
 }
 
 void fill(v1::Sample& out, const StatusData& status) {
