@@ -1,5 +1,7 @@
 #include "daemon/serve/status_message.hpp"
 
+#include <google/protobuf/util/time_util.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -33,14 +35,7 @@ void set(Message& message, void (Message::*setter)(double), double value) {
 double finite(double value) { return std::isfinite(value) ? value : 0.0; }
 
 void set_time(google::protobuf::Timestamp& out, std::int64_t utc_ns) {
-    std::int64_t seconds = utc_ns / drivers::kSecond;
-    std::int64_t rest = utc_ns % drivers::kSecond;
-    if (rest < 0) {
-        rest += drivers::kSecond;
-        --seconds;
-    }
-    out.set_seconds(seconds);
-    out.set_nanos(static_cast<std::int32_t>(rest));
+    out = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(utc_ns);
 }
 
 void fill(v1::Frame& out, const FrameStatus& frame) {
