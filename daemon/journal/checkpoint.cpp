@@ -50,8 +50,7 @@ class Reader {
 };
 
 /// One list of the summary's numbers, for both directions.
-template <typename Summary, typename Each>
-void each_number(Summary& s, Each&& each) {
+void each_number(auto& s, auto&& each) {
     each(s.run);
     each(s.position);
     each(s.samples);
@@ -66,29 +65,25 @@ void each_number(Summary& s, Each&& each) {
     each(s.innovation_correlation);
 }
 
-template <typename Levels, typename Each>
-void each_level(Levels& levels, Each&& each) {
+void each_level(auto& levels, auto&& each) {
     each(levels.angle_arcsec);
     for (auto& walk : levels.gyro_random_walk_deg_per_rt_h) each(walk);
 }
 
-template <typename Stop, typename Each>
-void each_part(Stop& stop, Each&& each) {
+void each_part(auto& stop, auto&& each) {
     for (auto& angle : stop.position_deg) each(angle);
     each(stop.table_g);
     each(stop.repeats);
     each(stop.used_s);
 }
 
-template <typename Sweep, typename Each>
-void each_of_sweep(Sweep& sweep, Each&& each) {
+void each_of_sweep(auto& sweep, auto&& each) {
     each(sweep.from_hz);
     each(sweep.to_hz);
     each(sweep.seconds);
 }
 
-template <typename Random, typename Each>
-void each_of_random(Random& random, Each&& each) {
+void each_of_random(auto& random, auto&& each) {
     each(random.mean_square_g2);
     each(random.bandwidth_hz);
     each(random.gain_error);
@@ -133,8 +128,7 @@ std::string numbers_of(const estimator::DwellSummary& summary) {
     return bytes;
 }
 
-template <typename Played, typename Each>
-void each_of_played(Played& played, Each&& each) {
+void each_of_played(auto& played, auto&& each) {
     each_of_random(played.random, each);
     each(played.seen.share);
     each(played.seen.error);
