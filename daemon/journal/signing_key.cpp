@@ -124,15 +124,8 @@ std::string sha256(std::string_view bytes) {
 }
 
 std::string to_hex(std::string_view bytes) {
-    constexpr std::string_view kDigits = "0123456789abcdef";
-    std::string text;
-    text.reserve(2 * bytes.size());
-    for (const char c : bytes) {
-        const auto byte = static_cast<unsigned char>(c);
-        text += kDigits[byte >> 4];
-        text += kDigits[byte & 0xf];
-    }
-    return text;
+    const unsigned char* const begin = bytes_of(bytes);
+    return fmt::format("{:02x}", fmt::join(begin, begin + bytes.size(), ""));
 }
 
 std::string from_hex(std::string_view text) {

@@ -13,19 +13,13 @@ namespace vibrig::record {
 
 namespace {
 
-std::string hex(const unsigned char* bytes, unsigned size) {
-    std::string text;
-    for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", bytes[i]);
-    return text;
-}
-
 using Digest = std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)>;
 
 std::string finish(Digest& digest) {
     std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
     unsigned size = 0;
     EVP_DigestFinal_ex(digest.get(), bytes.data(), &size);
-    return hex(bytes.data(), size);
+    return fmt::format("{:02x}", fmt::join(bytes.data(), bytes.data() + size, ""));
 }
 
 Digest begin_digest() {
