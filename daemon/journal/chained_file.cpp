@@ -150,10 +150,7 @@ void ChainedFile::check_head(const FoundHead& beside, std::vector<std::string>& 
 /// What came before this one is what its signed beginning says, not what lies beside it.
 bool ChainedFile::came_before(const std::string& chain) const {
     if (!database_ || !has_table(*database_, "origin")) return false;
-    return !database_
-                ->ask("SELECT 1 FROM origin WHERE instr(previous, ?) > 0",
-                      {std::string_view(chain)})
-                .empty();
+    return !database_->ask("SELECT 1 FROM origin WHERE instr(previous, ?) > 0", {chain}).empty();
 }
 
 void ChainedFile::check_anchors(std::vector<std::string>& found) {
@@ -266,13 +263,10 @@ void ChainedFile::make(const std::string& begins, const FirstRows& first_rows) {
                                         "with {} rows that version {} had kept without a "
                                          "chain: taken over as they were found",
                                         rows, version);
-        std::string previous;
-        for (const std::string& chain : previous_)
-            previous += (previous.empty() ? "" : " ") + chain;
+        const std::string previous = fmt::format("{}", fmt::join(previous_, " "));
         database_->run(
             "INSERT INTO origin (utc_ns, text, public_key, previous) VALUES (?, ?, ?, ?)",
-            {utc_now(), std::string_view(begins_), std::string_view(key_->public_key()),
-             std::string_view(previous)});
+            {utc_now(), begins_, key_->public_key(), previous});
         chained("origin", database_->last_id());
         name_ = to_hex(chain_.last().hash);
         chain_.take_over(*database_);
@@ -295,7 +289,7 @@ void ChainedFile::begin() {
 
 void ChainedFile::commit() {
     const auto head = sign_head(name_, chain_.last(), utc_now(), *key_);
-    database().run("INSERT OR REPLACE INTO head VALUES (1, ?)", {std::string_view(head.line())});
+    database().run("INSERT OR REPLACE INTO head VALUES (1, ?)", {head.line()});
     database().execute("COMMIT");
     head_ = head;
 }

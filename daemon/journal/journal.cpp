@@ -265,8 +265,7 @@ void Journal::write_one(const Begun& begun) {
     database().run(
         "INSERT INTO campaign (name, started_by, started_utc_ns, configuration_hash, state) "
         "VALUES (?, ?, ?, ?, 'running')",
-        {std::string_view(begun.name), std::string_view(begun.by), begun.utc_ns,
-         static_cast<std::int64_t>(configuration_hash_)});
+        {begun.name, begun.by, begun.utc_ns, static_cast<std::int64_t>(configuration_hash_)});
     campaign_ = database().last_id();
     chained("campaign");
 }
@@ -290,10 +289,8 @@ void Journal::write_one(const Done& done) {
         "ON CONFLICT (campaign, run, position) DO UPDATE SET samples = excluded.samples, "
         "used = excluded.used, rejected = excluded.rejected, flagged = excluded.flagged, "
         "reason = excluded.reason, checkpoint = excluded.checkpoint RETURNING rowid",
-        {campaign_, std::int64_t{done.info.run}, std::int64_t{done.info.position},
-         std::int64_t{done.summary.samples}, std::int64_t{done.summary.used},
-         std::int64_t{done.summary.rejected}, std::int64_t{done.summary.flagged},
-         std::string_view(done.summary.reason), Blob{bytes}});
+        {campaign_, done.info.run, done.info.position, done.summary.samples, done.summary.used,
+         done.summary.rejected, done.summary.flagged, done.summary.reason, Blob{bytes}});
     file_.chained("dwell", row.front().numbers[0]);
 }
 
@@ -302,8 +299,7 @@ void Journal::write_one(const Ended& ended) {
     database().run(
         "UPDATE campaign SET state = ?, reason = ?, ended_utc_ns = ?, result_json = ? "
         "WHERE id = ?",
-        {std::string_view(ended.state), std::string_view(ended.reason), ended.utc_ns,
-         std::string_view(ended.result), campaign_});
+        {ended.state, ended.reason, ended.utc_ns, ended.result, campaign_});
     file_.chained("campaign", campaign_);
     campaign_ = 0;
     collected_.clear();
@@ -312,8 +308,7 @@ void Journal::write_one(const Ended& ended) {
 void Journal::write_one(const EventRecord& event) {
     database().run(
         "INSERT INTO event (utc_ns, time_ns, severity, source, text) VALUES (?, ?, ?, ?, ?)",
-        {event.utc_ns, event.time, std::string_view(name_of(event.severity)),
-         std::string_view(event.source), std::string_view(event.text)});
+        {event.utc_ns, event.time, name_of(event.severity), event.source, event.text});
     chained("event");
 }
 
@@ -321,22 +316,20 @@ void Journal::write_one(const Commanded& commanded) {
     database().run(
         "INSERT INTO command (utc_ns, kind, person, argument, accepted, answer) "
         "VALUES (?, ?, ?, ?, ?, ?)",
-        {commanded.utc_ns, std::string_view(word_of(commanded.request.kind)),
-         std::string_view(commanded.request.by), std::string_view(commanded.request.argument),
-         std::int64_t{commanded.reply.accepted}, std::string_view(commanded.reply.message)});
+        {commanded.utc_ns, word_of(commanded.request.kind), commanded.request.by,
+         commanded.request.argument, commanded.reply.accepted, commanded.reply.message});
     chained("command");
 }
 
 void Journal::write_one(const LoopChecked& checked) {
-    database().run(
-        "INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
-        {checked.utc_ns, std::string_view(checked.by), std::string_view(checked.out_of_band)});
+    database().run("INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
+                   {checked.utc_ns, checked.by, checked.out_of_band});
     chained("loop_check");
 }
 
 void Journal::write_one(const Proved& proved) {
     database().run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
-                   {proved.utc_ns, std::string_view(proved.by), std::string_view(proved.record)});
+                   {proved.utc_ns, proved.by, proved.record});
     chained("proof");
 }
 
@@ -344,9 +337,7 @@ void Journal::write_one(const Commissioned& row) {
     database().run(
         "INSERT INTO commissioning (utc_ns, part, step, by, identity, what, data_json) "
         "VALUES (?, ?, ?, ?, ?, ?, ?)",
-        {row.utc_ns, std::string_view(row.part), std::string_view(row.step),
-         std::string_view(row.by), std::string_view(row.identity), std::string_view(row.what),
-         std::string_view(row.data_json)});
+        {row.utc_ns, row.part, row.step, row.by, row.identity, row.what, row.data_json});
     chained(kCommissioning);
 }
 
@@ -354,9 +345,7 @@ void Journal::write_one(const Safety& safety) {
     database().run(
         "INSERT INTO safety (utc_ns, what, name, person, text, two_persons) "
         "VALUES (?, ?, ?, ?, ?, ?)",
-        {safety.utc_ns, std::string_view(safety.what), std::string_view(safety.name),
-         std::string_view(safety.person), std::string_view(safety.text),
-         std::int64_t{safety.two_persons}});
+        {safety.utc_ns, safety.what, safety.name, safety.person, safety.text, safety.two_persons});
     chained("safety");
 }
 

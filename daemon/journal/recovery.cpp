@@ -12,12 +12,6 @@ namespace {
 
 constexpr std::size_t kProofsKept = 200;  // read back at the start
 
-std::string joined(const std::vector<std::string>& words) {
-    std::string all;
-    for (const std::string& one : words) all += (all.empty() ? "" : "; ") + one;
-    return all;
-}
-
 }  // namespace
 
 void Journal::recover() {
@@ -68,7 +62,7 @@ void Journal::recover_signed_parts() {
 void Journal::recover_certificates() {
     for (const Row& row : database().ask("SELECT json_extract(argument, '$.number') FROM command "
                                          "WHERE kind = ? AND accepted = 1",
-                                         {std::string_view(kCertificate)}))
+                                         {kCertificate}))
         recovery_.certificates.push_back(row.texts.at(0));
 }
 
@@ -151,7 +145,7 @@ void Journal::recover_dwells(Unfinished& campaign) {
 }
 
 void Journal::begin_anew(const std::vector<std::string>& found) {
-    std::string why = joined(found);
+    std::string why = fmt::format("{}", fmt::join(found, "; "));
     std::vector<Row> campaign;
     try {
         if (started_) {  // what is latched and armed is known
@@ -195,8 +189,7 @@ void Journal::carry_campaign(const std::vector<Row>& campaign) {
     database().run(
         "INSERT INTO campaign (id, name, started_by, started_utc_ns, configuration_hash, state) "
         "VALUES (?, ?, ?, ?, ?, 'running')",
-        {row.numbers[0], std::string_view(row.texts[1]), std::string_view(row.texts[2]),
-         row.numbers[3], row.numbers[4]});
+        {row.numbers[0], row.texts[1], row.texts[2], row.numbers[3], row.numbers[4]});
     chained("campaign");
 }
 

@@ -84,13 +84,19 @@ IndexedFile look_at_raw(const std::string& path) {
 std::string Index::path_in(const std::string& folder) { return folder + "/recordings.sqlite3"; }
 
 Index::Index(std::string folder, const Tell& tell) : folder_(std::move(folder)), tell_(tell) {
+    or_make_anew([this] { open(); });
+    static_cast<void>(ask("SELECT name FROM file LIMIT 1"));
+}
+
+bool Index::or_make_anew(const std::function<void()>& act) {
     try {
-        open();
+        act();
+        return true;
     } catch (const DatabaseError& error) {
         if (!error.damaged()) throw;
         make_anew(error.what());
+        return false;
     }
-    static_cast<void>(ask("SELECT name FROM file LIMIT 1"));
 }
 
 void Index::make_anew(const std::string& why) {
@@ -103,13 +109,10 @@ void Index::make_anew(const std::string& why) {
 
 std::vector<journal::Row> Index::ask(const char* sql, const std::vector<std::string>& texts) {
     const std::vector<journal::Value> values(texts.begin(), texts.end());
-    try {
-        return database_->ask(sql, values);
-    } catch (const DatabaseError& error) {
-        if (!error.damaged()) throw;
-        make_anew(error.what());
-    }
-    return database_->ask(sql, values);
+    std::vector<journal::Row> rows;
+    const auto look = [&] { rows = database_->ask(sql, values); };
+    if (!or_make_anew(look)) look();
+    return rows;
 }
 
 Index::~Index() = default;
@@ -123,9 +126,8 @@ void Index::open() {
 
 void Index::put(const std::string& key, const IndexedFile& file) {
     database_->run("INSERT OR REPLACE INTO file VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                   {std::string_view(key), std::string_view(file.name), std::int64_t{file.part},
-                    std::int64_t{file.closed}, file.from_utc_ns, file.to_utc_ns, file.rows,
-                    file.bytes, std::string_view(file.sha256)});
+                   {key, file.name, file.part, file.closed, file.from_utc_ns, file.to_utc_ns,
+                    file.rows, file.bytes, file.sha256});
 }
 
 void Index::look(const std::string& path) {
@@ -138,9 +140,7 @@ void Index::look(const std::string& path) {
         database_->run(
             "INSERT INTO campaign VALUES (?, ?, ?, ?, ?) "
             "ON CONFLICT (key) DO UPDATE SET state = excluded.state",
-            {std::string_view(key), std::string_view(head.head.name),
-             std::string_view(head.head.started_by), head.head.utc_ns,
-             std::string_view(head.state)});
+            {key, head.head.name, head.head.started_by, head.head.utc_ns, head.state});
     } else {
         file = look_at_raw(path);
     }
@@ -148,20 +148,14 @@ void Index::look(const std::string& path) {
     file.bytes = static_cast<std::int64_t>(fs::file_size(path));
     if (file.closed) file.sha256 = sha256_of_file(path);
     if (file.part == 0 && file.closed)
-        database_->run(
-            "DELETE FROM file WHERE campaign = ? AND name = ?",
-            {std::string_view(key), std::string_view(file.name).substr(
-                                        0, file.name.size() - std::string_view(".zst").size())});
+        database_->run("DELETE FROM file WHERE campaign = ? AND name = ?",
+                       {key, std::string_view(file.name).substr(
+                                 0, file.name.size() - std::string_view(".zst").size())});
     put(key, file);
 }
 
 void Index::note_file(const std::string& path) {
-    try {
-        look(path);
-    } catch (const DatabaseError& error) {
-        if (!error.damaged()) throw;
-        make_anew(error.what());  // with this file
-    }
+    or_make_anew([&] { look(path); });  // with this file
 }
 
 void Index::look_at_folder(const std::string& campaign_folder) {
@@ -170,12 +164,7 @@ void Index::look_at_folder(const std::string& campaign_folder) {
 }
 
 void Index::note(const std::string& campaign_folder) {
-    try {
-        look_at_folder(campaign_folder);
-    } catch (const DatabaseError& error) {
-        if (!error.damaged()) throw;
-        make_anew(error.what());
-    }
+    or_make_anew([&] { look_at_folder(campaign_folder); });
 }
 
 std::size_t Index::rebuild() {

@@ -66,6 +66,8 @@ class Index {
     void open();
     void look(const std::string& path);
     void look_at_folder(const std::string& campaign_folder);
+    /// False: it was found damaged, and made anew.
+    bool or_make_anew(const std::function<void()>& act);
     void make_anew(const std::string& why);
     /// Where it is found damaged only now, it is made anew.
     [[nodiscard]] std::vector<journal::Row> ask(const char* sql,
