@@ -4,6 +4,7 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -16,14 +17,6 @@ namespace vibrig::record::hdf5 {
 namespace {
 
 static_assert(sizeof(hid_t) == sizeof(std::int64_t));
-
-int close_file(std::int64_t id) { return H5Fclose(id); }
-int close_set(std::int64_t id) { return H5Dclose(id); }
-int close_space(std::int64_t id) { return H5Sclose(id); }
-int close_type(std::int64_t id) { return H5Tclose(id); }
-int close_list(std::int64_t id) { return H5Pclose(id); }
-int close_group(std::int64_t id) { return H5Gclose(id); }
-int close_attribute(std::int64_t id) { return H5Aclose(id); }
 
 /// The library prints to standard error unless told not to, each thread for itself.
 void quiet() {
@@ -56,27 +49,15 @@ std::string what_it_says() {
 }
 
 std::int64_t native(Type type) {
-    switch (type) {
-        case Type::f64:
-            return H5T_NATIVE_DOUBLE;
-        case Type::i64:
-            return H5T_NATIVE_INT64;
-        case Type::u64:
-            return H5T_NATIVE_UINT64;
-        case Type::i32:
-            return H5T_NATIVE_INT32;
-        case Type::u32:
-            return H5T_NATIVE_UINT32;
-        case Type::u8:
-        case Type::text:
-            return H5T_NATIVE_UINT8;
-    }
-    return H5T_NATIVE_UINT8;
+    const std::array<hid_t, 7> types{H5T_NATIVE_DOUBLE, H5T_NATIVE_INT64,  H5T_NATIVE_UINT64,
+                                     H5T_NATIVE_INT32,  H5T_NATIVE_UINT32, H5T_NATIVE_UINT8,
+                                     H5T_NATIVE_UINT8};
+    return types[static_cast<std::size_t>(type)];
 }
 
 /// Ends with a zero only where there is room, as h5py, Octave and MATLAB take it.
 Handle text_type(std::size_t size) {
-    Handle type(H5Tcopy(H5T_C_S1), close_type);
+    Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
     H5Tset_size(type.get(), std::max<std::size_t>(size, 1));
     H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
     return type;
@@ -95,7 +76,7 @@ Handle attribute_type(std::size_t size) {
 constexpr std::size_t kWritersMetadata = 64 * 1024, kReadersMetadata = 1024 * 1024;
 
 Handle access_list(std::size_t metadata_bytes) {
-    Handle list(H5Pcreate(H5P_FILE_ACCESS), close_list);
+    Handle list(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_libver_bounds(list.get(), H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
     // Of each column a chunk or two, the full ones given up first. The library's 1 MB would fill
     // with what is written already, for hours, in every one of some forty columns; and where a
@@ -117,7 +98,7 @@ Handle access_list(std::size_t metadata_bytes) {
 }
 
 std::vector<std::size_t> dimensions_of(const Handle& set) {
-    const Handle space(H5Dget_space(set.get()), close_space);
+    const Handle space(H5Dget_space(set.get()), H5Sclose);
     const int rank = H5Sget_simple_extent_ndims(space.get());
     std::vector<hsize_t> found(static_cast<std::size_t>(std::max(rank, 0)));
     H5Sget_simple_extent_dims(space.get(), found.data(), nullptr);
@@ -155,7 +136,7 @@ File File::create(const std::string& path) {
     file.path_ = path;
     file.file_ = Handle(
         H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access_list(kWritersMetadata).get()),
-        close_file);
+        H5Fclose);
     if (file.file_.get() < 0) file.fail("");
     return file;
 }
@@ -166,7 +147,7 @@ File File::open(const std::string& path, Mode mode) {
     file.path_ = path;
     const Handle list = access_list(kReadersMetadata);
     const auto attempt = [&](unsigned flags) {
-        file.file_ = Handle(H5Fopen(path.c_str(), flags, list.get()), close_file);
+        file.file_ = Handle(H5Fopen(path.c_str(), flags, list.get()), H5Fclose);
         return file.file_.get() >= 0;
     };
     if (mode == Mode::mend) {
@@ -203,7 +184,7 @@ void File::close() {
 
 void File::make_group(const std::string& name) {
     const Handle group(H5Gcreate2(file_.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                       close_group);
+                       H5Gclose);
     if (group.get() < 0) fail(name);
 }
 
@@ -219,10 +200,10 @@ void File::attribute(const std::string& object, const char* name, std::int64_t t
                      const void* value) {
     if (H5Aexists_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT) > 0)
         H5Adelete_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT);
-    const Handle space(H5Screate(H5S_SCALAR), close_space);
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
     const Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name, type, space.get(),
                                         H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                      close_attribute);
+                      H5Aclose);
     if (made.get() < 0 || H5Awrite(made.get(), type, value) < 0)
         fail(object + ": attribute " + name);
 }
@@ -239,9 +220,9 @@ void File::set(const std::string& object, const char* name, std::int64_t number)
 
 std::string File::text(const std::string& object, const char* name) const {
     const Handle found(H5Aopen_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),
-                       close_attribute);
+                       H5Aclose);
     if (found.get() < 0) fail(object + ": attribute " + name);
-    const Handle type(H5Aget_type(found.get()), close_type);
+    const Handle type(H5Aget_type(found.get()), H5Tclose);
     if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
         throw Error(path_ + ": " + object + ": attribute " + name +
                     ": found no text, expected one");
@@ -252,7 +233,7 @@ std::string File::text(const std::string& object, const char* name) const {
 
 std::int64_t File::number(const std::string& object, const char* name) const {
     const Handle found(H5Aopen_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),
-                       close_attribute);
+                       H5Aclose);
     std::int64_t number = 0;
     if (found.get() < 0 || H5Aread(found.get(), H5T_NATIVE_INT64, &number) < 0)
         fail(object + ": attribute " + name);
@@ -264,7 +245,7 @@ void File::write_set(const std::string& name, const Handle& space, std::int64_t 
     if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
     const Handle made(H5Dcreate2(file_.get(), name.c_str(), type, space.get(), H5P_DEFAULT,
                                  H5P_DEFAULT, H5P_DEFAULT),
-                      close_set);
+                      H5Dclose);
     if (made.get() < 0 || H5Dwrite(made.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
         fail(name);
 }
@@ -273,7 +254,7 @@ void File::write_text(const std::string& name, std::string_view text,
                       std::string_view description) {
     std::string padded(text);
     padded.resize(std::max<std::size_t>(text.size(), 1));
-    write_set(name, Handle(H5Screate(H5S_SCALAR), close_space), text_type(padded.size()).get(),
+    write_set(name, Handle(H5Screate(H5S_SCALAR), H5Sclose), text_type(padded.size()).get(),
               padded.data());
     set(name, "description", description);
 }
@@ -289,14 +270,14 @@ void File::write_numbers(const std::string& name, std::span<const double> values
     const std::vector<hsize_t> size(dimensions.begin(), dimensions.end());
     write_set(
         name,
-        Handle(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), close_space),
+        Handle(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose),
         H5T_NATIVE_DOUBLE, values.data());
     set(name, "unit", unit);
     set(name, "description", description);
 }
 
 Handle File::open_set(const std::string& name) const {
-    Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
+    Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
     if (set.get() < 0) fail(name);
     return set;
 }
@@ -321,7 +302,7 @@ Array<std::int64_t> File::integers(const std::string& name) const {
 
 std::vector<std::string> File::texts(const std::string& name) const {
     const Handle set = open_set(name);
-    const Handle type(H5Dget_type(set.get()), close_type);
+    const Handle type(H5Dget_type(set.get()), H5Tclose);
     if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
         throw Error(path_ + ": " + name + ": found no texts of fixed size, expected them");
     const std::size_t size = H5Tget_size(type.get());
@@ -370,13 +351,13 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std
             chunk.push_back(d);
         }
         const Handle space(
-            H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), close_space);
-        const Handle list(H5Pcreate(H5P_DATASET_CREATE), close_list);
+            H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), H5Sclose);
+        const Handle list(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
         H5Pset_chunk(list.get(), static_cast<int>(chunk.size()), chunk.data());
         set_fill(list.get(), column.spec.type);
         column.dataset = Handle(H5Dcreate2(file.id(), column.name.c_str(), column.type.get(),
                                            space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT),
-                                close_set);
+                                H5Dclose);
         if (column.dataset.get() < 0) file.fail(column.name);
         if (*column.spec.unit != '\0') file.set(column.name, "unit", column.spec.unit);
         file.set(column.name, "description", column.spec.description);
@@ -396,7 +377,7 @@ Table::Column& Table::add(ColumnSpec spec) {
     Column& column = columns_.emplace_back();
     column.name = group_ + "/" + spec.name;
     column.type = spec.type == Type::text ? text_type(spec.text_bytes)
-                                          : Handle(H5Tcopy(native(spec.type)), close_type);
+                                          : Handle(H5Tcopy(native(spec.type)), H5Tclose);
     column.bytes = count_of(spec.shape) * H5Tget_size(column.type.get());
     column.spec = std::move(spec);
     return column;
@@ -437,11 +418,11 @@ void Table::commit() {
             size.push_back(d);
         }
         if (H5Dset_extent(column.dataset.get(), size.data()) < 0) file_->fail(column.name);
-        const Handle in_file(H5Dget_space(column.dataset.get()), close_space);
+        const Handle in_file(H5Dget_space(column.dataset.get()), H5Sclose);
         H5Sselect_hyperslab(in_file.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(),
                             nullptr);
         const Handle in_memory(
-            H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), close_space);
+            H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
         if (H5Dwrite(column.dataset.get(), column.type.get(), in_memory.get(), in_file.get(),
                      H5P_DEFAULT, column.buffer.data()) < 0)
             file_->fail(column.name);
