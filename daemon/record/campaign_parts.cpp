@@ -117,12 +117,9 @@ void go_on_after_restart(Campaign& to, Campaign& part, Time last) {
             to.parts.back().path, before, part.head.dwells_before);
     cut_back(to, part.head.dwells_before);
     to.restarted_at = to.dwells.size();
-    Gap gap;
-    gap.from = last;
-    gap.to = part.samples.empty() ? last : part.samples.front().time;
-    gap.stream = "restart";
-    gap.reason = "the daemon did not run; the campaign was resumed by " + part.head.started_by;
-    to.gaps.push_back(gap);
+    to.gaps.push_back(
+        {last, part.samples.empty() ? last : part.samples.front().time, "restart", 0,
+         "the daemon did not run; the campaign was resumed by " + part.head.started_by});
 }
 
 /// Puts `part` behind what there is.
@@ -195,11 +192,10 @@ std::string campaign_path(const std::string& argument) {
     }
     if (found.size() == 1) return found.front();
     std::ranges::sort(found);
-    std::string names;
-    for (const auto& name : found) names += " " + name;
     throw std::runtime_error(found.empty()
                                  ? argument + ": found no campaign.h5 in it, expected one"
-                                 : argument + ": found several campaigns, expected one of" + names);
+                                 : fmt::format("{}: found several campaigns, expected one of {}",
+                                               argument, fmt::join(found, " ")));
 }
 
 std::string with_raw_log(std::string what, const std::string& path) {

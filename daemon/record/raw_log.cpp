@@ -25,10 +25,7 @@ namespace {
 constexpr std::size_t kBuffer = 65'536;
 constexpr int kLevel = 3;  // of zstd: fast, and logs shrink to a fifth
 
-struct CloseFile {
-    void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
-};
-using StdFile = std::unique_ptr<std::FILE, CloseFile>;
+using StdFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 }  // namespace
 
@@ -189,8 +186,8 @@ void RawLog::close() {
 std::string compress(const std::string& path, const std::function<void()>& on_progress) {
     const std::string to = path + ".zst";
     const std::string part = to + ".part";
-    const StdFile in(std::fopen(path.c_str(), "rb"));
-    StdFile out(std::fopen(part.c_str(), "wb"));
+    const StdFile in(std::fopen(path.c_str(), "rb"), std::fclose);
+    StdFile out(std::fopen(part.c_str(), "wb"), std::fclose);
     if (!in || !out) return part + ": " + std::strerror(errno);
     const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
                                                                      ZSTD_freeCCtx);
@@ -227,7 +224,7 @@ std::string compress(const std::string& path, const std::function<void()>& on_pr
 }
 
 struct RawReader::Input {
-    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{nullptr, std::fclose};
+    StdFile file{nullptr, std::fclose};
     bool packed = false;
     std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context{ZSTD_createDCtx(), ZSTD_freeDCtx};
     std::vector<char> from = std::vector<char>(ZSTD_DStreamInSize());

@@ -222,13 +222,8 @@ void Recorder::take(const drivers::Sample& sample) {
     if (!head_) return;
     newest_sample_ = sample.time;
     if (sample.dropped_before > 0) {
-        Gap gap;
-        gap.from = gap.to = sample.time;
-        gap.stream = "samples";
-        gap.lost = sample.dropped_before;
-        gap.reason = "ring full";
-        shown_.samples_lost += gap.lost;
-        write_gap(gap);
+        shown_.samples_lost += sample.dropped_before;
+        write_gap({sample.time, sample.time, "samples", sample.dropped_before, "ring full"});
     }
     if (writer_) {
         writer_->put(sample);

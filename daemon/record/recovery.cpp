@@ -44,9 +44,7 @@ std::vector<drivers::Sample> more_from_raw(const Campaign& part, Gap& gap, std::
 void mend_last(const std::string& path) {
     File::open(path, File::Mode::mend).close();
     const Campaign part = read_part(path);
-    Gap gap;
-    gap.stream = "end";
-    gap.reason = "the recorder died; nothing is recorded after this";
+    Gap gap{0, 0, "end", 0, "the recorder died; nothing is recorded after this"};
     std::string failure;
     const auto more = more_from_raw(part, gap, failure);
     const Time end = more.empty() ? last_time(part) : more.back().time;
