@@ -80,11 +80,7 @@ void Outbox::start() {
 
 void Outbox::stop() noexcept {
     stop_.store(true);
-    {
-        const std::lock_guard lock(mutex_);
-        look_ = true;
-    }
-    changed_.notify_all();
+    look();
     if (thread_.joinable()) thread_.join();
 }
 
@@ -114,6 +110,19 @@ Outbox::TypeKnown Outbox::type_known() const {
 void Outbox::show(const std::function<void(ArchiveStatus&)>& change) {
     const std::lock_guard lock(mutex_);
     change(status_);
+}
+
+void Outbox::show_waiting(const std::function<void(ArchiveStatus&)>& change) {
+    const auto campaigns = scan();
+    show([&](ArchiveStatus& s) {
+        s.waiting = s.waiting_bytes = 0;
+        for (const Campaign& one : campaigns) {
+            if (one.delivered) continue;
+            ++s.waiting;
+            s.waiting_bytes += one.bytes;
+        }
+        change(s);
+    });
 }
 
 void Outbox::wait(double seconds) {
@@ -199,16 +208,7 @@ std::vector<Outbox::Campaign> Outbox::scan() const {
 }
 
 bool Outbox::deliver(const Campaign& campaign) {
-    const auto waiting = scan();
-    show([&](ArchiveStatus& s) {
-        s.waiting = s.waiting_bytes = 0;
-        for (const Campaign& one : waiting) {
-            if (one.delivered) continue;
-            ++s.waiting;
-            s.waiting_bytes += one.bytes;
-        }
-        s.delivering = campaign.key;
-    });
+    show_waiting([&](ArchiveStatus& s) { s.delivering = campaign.key; });
     auto words = command({"archive", "add", campaign.path});
     if (!settings_.rig.empty()) {
         words.emplace_back("--rig");
@@ -233,14 +233,7 @@ bool Outbox::deliver(const Campaign& campaign) {
                                           "again: " +
                                           run.error);
     }
-    const auto left = scan();
-    show([&](ArchiveStatus& s) {
-        s.waiting = s.waiting_bytes = 0;
-        for (const Campaign& one : left) {
-            if (one.delivered) continue;
-            ++s.waiting;
-            s.waiting_bytes += one.bytes;
-        }
+    show_waiting([&](ArchiveStatus& s) {
         s.delivering.clear();
         s.good = good;
         s.note = good ? "" : run.error;

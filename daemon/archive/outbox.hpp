@@ -68,6 +68,8 @@ class Outbox {
     void wait(double seconds);
     [[nodiscard]] std::vector<std::string> command(std::vector<std::string> words) const;
     void show(const std::function<void(ArchiveStatus&)>& change);
+    /// With what waits, by a look at the folders.
+    void show_waiting(const std::function<void(ArchiveStatus&)>& change);
 
     const Settings settings_;
     const std::string recordings_;
