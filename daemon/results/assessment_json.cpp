@@ -14,16 +14,6 @@ const char* word_of(Shape shape) {
     return kWords[static_cast<std::size_t>(shape)];
 }
 
-/// null for an empty text.
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
-
-template <class Values>
-Json numbers(const Values& values) {
-    Json list = Json::array();
-    for (const double value : values) list.push_back(number_or_null(value));
-    return list;
-}
-
 Json budget(const std::vector<Contribution>& contributions) {
     Json list = Json::array();
     for (const Contribution& one : contributions)
@@ -103,7 +93,7 @@ Json drift(const Assessment& a) {
             {"weights", std::move(weights)},
             {"step", std::move(step)},
             {"trend_deg_h_h", std::move(trend)},
-            {"ramp_deg_h_per_100_s", numbers(a.ramps.mean)},
+            {"ramp_deg_h_per_100_s", numbers_or_null(a.ramps.mean)},
             {"bias_now", std::move(now)}};
 }
 
@@ -113,7 +103,7 @@ Json cross_axis(const Assessment& a) {
         list.push_back({{"run", of.run},
                         {"c_n", number_or_null(of.gamma[3])},
                         {"c_e", number_or_null(of.gamma[5])},
-                        {"gamma", numbers(of.gamma)}});
+                        {"gamma", numbers_or_null(of.gamma)}});
     return list;
 }
 
@@ -124,10 +114,10 @@ Json dwell_rates(const Assessment& a) {
                         {"position", rate.position},
                         {"level", number_or_null(rate.level_g)},
                         {"t_h", number_or_null(rate.time_h)},
-                        {"rate", numbers(rate.rate)},
-                        {"sigma", numbers(rate.sigma)},
-                        {"residual", numbers(rate.residual)},
-                        {"residual_sigma", numbers(rate.residual_sigma)}});
+                        {"rate", numbers_or_null(rate.rate)},
+                        {"sigma", numbers_or_null(rate.sigma)},
+                        {"residual", numbers_or_null(rate.residual)},
+                        {"residual_sigma", numbers_or_null(rate.residual_sigma)}});
     return list;
 }
 
@@ -142,16 +132,6 @@ Json freed(const Assessment& a) {
     return list;
 }
 
-Json matrix(const Eigen::MatrixXd& of) {
-    Json rows = Json::array();
-    for (Eigen::Index i = 0; i < of.rows(); ++i) {
-        Json row = Json::array();
-        for (Eigen::Index j = 0; j < of.cols(); ++j) row.push_back(number_or_null(of(i, j)));
-        rows.push_back(std::move(row));
-    }
-    return rows;
-}
-
 }  // namespace
 
 Json coefficient_json(const Coefficient& c) {
@@ -164,7 +144,7 @@ Json coefficient_json(const Coefficient& c) {
 Json assessment_json(const Assessment& a) {
     Json root{{"verdict", verdict(a.verdict)}};
     if (!a.done) return root;
-    root["covariance_combined"] = matrix(a.covariance_combined);
+    root["covariance_combined"] = matrix_or_null(a.covariance_combined);
     root["fit"] = fit(a);
     root["drift"] = drift(a);
     root["cross_axis"] = cross_axis(a);

@@ -22,18 +22,6 @@ using estimator::kParameters;
 using namespace estimator::spectrum;
 using Json = nlohmann::ordered_json;
 
-Json numbers_of(const VectorXd& values) {
-    Json list = Json::array();
-    for (const double value : values) list.push_back(number_or_null(value));
-    return list;
-}
-
-Json rows_of(const MatrixXd& matrix) {
-    Json rows = Json::array();
-    for (Index i = 0; i < matrix.rows(); ++i) rows.push_back(numbers_of(matrix.row(i)));
-    return rows;
-}
-
 std::string axis_text(const estimator::SignedAxis& axis) {
     return std::string(axis.sign < 0 ? "-" : "+") + "xyz"[axis.axis];
 }
@@ -64,7 +52,7 @@ Json groups_json(const SpectrumResult& of) {
         }
         const std::string& profile = of.table.kinds()[k].profile;
         list.push_back({{"hz", of.table.kinds()[k].hz()},
-                        {"profile", profile.empty() ? Json(nullptr) : Json(profile)},
+                        {"profile", text_or_null(profile)},
                         {"dwells", of.table.dwells_of(k)},
                         {"coefficients", std::move(value)},
                         {"sigma", std::move(sigma)}});
@@ -100,8 +88,8 @@ Json told_json(const Told& told) {
             {"hz_interval", {told.hz.low, told.hz.high}},
             {"damping", told.damping.mean},
             {"damping_interval", {told.damping.low, told.damping.high}},
-            {"elastic", numbers_of(told.elastic)},
-            {"sigma", numbers_of(told.sigma)}};
+            {"elastic", numbers_or_null(told.elastic)},
+            {"sigma", numbers_or_null(told.sigma)}};
 }
 
 /// One resonance as itself, two as a list, none as null.
@@ -121,8 +109,8 @@ Json mixture_json(const std::vector<Hypothesis>& mixture) {
             {{"w", one.weight},
              {"hz", one_or_list(one.resonances, [](auto& r) { return Json(r.hz); })},
              {"damping", one_or_list(one.resonances, [](auto& r) { return Json(r.damping); })},
-             {"x", numbers_of(one.x)},
-             {"p", rows_of(one.covariance)}});
+             {"x", numbers_or_null(one.x)},
+             {"p", matrix_or_null(one.covariance)}});
     return list;
 }
 
@@ -130,9 +118,9 @@ Json effects_json(const std::vector<Effect>& effects) {
     Json list = Json::array();
     for (const Effect& effect : effects) {
         Json change = Json::array();
-        for (const VectorXd& gyro : effect.change) change.push_back(numbers_of(gyro));
+        for (const VectorXd& gyro : effect.change) change.push_back(numbers_or_null(gyro));
         list.push_back({{"input", effect.input},
-                        {"element", effect.element.empty() ? Json(nullptr) : Json(effect.element)},
+                        {"element", text_or_null(effect.element)},
                         {"change", std::move(change)}});
     }
     return list;
@@ -165,11 +153,11 @@ Json held_out_json(const SpectrumResult& of) {
         list.push_back({{"run", row.run},
                         {"position", row.position},
                         {"hz", kind.hz()},
-                        {"profile", kind.profile.empty() ? Json(nullptr) : Json(kind.profile)},
-                        {"rate", numbers_of(row.rate)},
-                        {"predicted", numbers_of(foretold.drift.row(k))},
-                        {"u", numbers_of(u)},
-                        {"z", numbers_of(verified.z.row(k))}});
+                        {"profile", text_or_null(kind.profile)},
+                        {"rate", numbers_or_null(row.rate)},
+                        {"predicted", numbers_or_null(foretold.drift.row(k))},
+                        {"u", numbers_or_null(u)},
+                        {"z", numbers_or_null(verified.z.row(k))}});
     }
     return list;
 }
@@ -276,22 +264,21 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
         mixture.push_back(mixture_json(gyro.list));
         lack.push_back(of.several() ? number_or_null(a.lack_of_fit[j]) : Json(nullptr));
     }
-    root["spectrum"] = {
-        {"model", name_of(a.form)},
-        {"frequencies", groups_json(of)},
-        {"sweeps", sweeps_json(of.sweeps)},
-        {"flat", of.table.kinds().size() > 1 ? flat_json(a.flat) : Json(nullptr)},
-        {"log_odds", std::move(odds)},
-        {"resonance", std::move(resonance)},
-        {"mixture", std::move(mixture)},
-        {"lack_of_fit", std::move(lack)},
-        {"lowest_hz", a.model.lowest_hz},
-        {"highest_hz", a.model.highest_hz},
-        {"held_out", held_out_json(of)},
-        {"refusal", a.model.refusal.empty() ? Json(nullptr) : Json(a.model.refusal)},
-        {"not_told", not_told()},
-        {"effects", effects_json(a.model.effects)},
-        {"platform", frame_json(a.model.frame)}};
+    root["spectrum"] = {{"model", name_of(a.form)},
+                        {"frequencies", groups_json(of)},
+                        {"sweeps", sweeps_json(of.sweeps)},
+                        {"flat", of.table.kinds().size() > 1 ? flat_json(a.flat) : Json(nullptr)},
+                        {"log_odds", std::move(odds)},
+                        {"resonance", std::move(resonance)},
+                        {"mixture", std::move(mixture)},
+                        {"lack_of_fit", std::move(lack)},
+                        {"lowest_hz", a.model.lowest_hz},
+                        {"highest_hz", a.model.highest_hz},
+                        {"held_out", held_out_json(of)},
+                        {"refusal", text_or_null(a.model.refusal)},
+                        {"not_told", not_told()},
+                        {"effects", effects_json(a.model.effects)},
+                        {"platform", frame_json(a.model.frame)}};
 }
 
 Model read_model(const nlohmann::json& root, const std::string& path) {
