@@ -21,6 +21,7 @@ struct Curve {
         x.push_back(at);
         y.push_back(value);
     }
+    /// A point with its band, or error bar.
     void add(double at, double value, double from, double to) {
         add(at, value);
         low.push_back(from);

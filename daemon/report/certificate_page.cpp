@@ -14,8 +14,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-using Rows = std::vector<std::vector<std::string>>;
-
 /// Digits that two of the uncertainty's leave (JCGM 100, 7.2.6).
 int digits_of(double expanded) {
     return std::clamp(1 - static_cast<int>(std::floor(std::log10(expanded))), 0, 12);

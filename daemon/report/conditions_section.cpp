@@ -28,22 +28,16 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
     const double origin = drivers::to_seconds(campaign.samples.front().time);
     const std::size_t every = std::max<std::size_t>(1, rows.size() / (kMostRows));
     const auto curve = [&](const char* name, Look look, const auto& value) {
-        Curve made;
-        made.name = name;
-        made.look = look;
+        Curve made{.name = name, .look = look};
         for (std::size_t i = 0; i < rows.size(); i += every) {
-            made.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            made.y.push_back(value(rows[i]));
+            made.add(drivers::to_seconds(rows[i].time) - origin, value(rows[i]));
         }
         return made;
     };
     const auto known = [](const Curve& c) {
         return std::ranges::any_of(c.y, [](double y) { return std::isfinite(y); });
     };
-    Chart temperature;
-    temperature.title = "Temperatures";
-    temperature.x = Axis("time, s");
-    temperature.y = Axis("degC");
+    Chart temperature{.title = "Temperatures", .x = Axis("time, s"), .y = Axis("degC")};
     temperature.curves = {
         curve("inner element", Look::line, [](const auto& r) { return r.temperature_c; })};
     for (std::size_t k = 0; k < drivers::kTemperatureSensors.size(); ++k)
@@ -52,10 +46,9 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
     std::erase_if(temperature.curves, [&](const Curve& c) { return !known(c); });
     if (!temperature.curves.empty())
         page.figure(temperature.svg(), "As the platform told them; holes: it did not.");
-    Chart shaker;
-    shaker.title = "Shaker: command and read-back";
-    shaker.x = Axis("time, s");
-    shaker.y = Axis("peak at the table, g");
+    Chart shaker{.title = "Shaker: command and read-back",
+                 .x = Axis("time, s"),
+                 .y = Axis("peak at the table, g")};
     shaker.curves = {
         curve("commanded", Look::line, [](const auto& r) { return r.command_g; }),
         curve("set-point read back", Look::dashed, [](const auto& r) { return r.set_point_g; }),
@@ -64,8 +57,7 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
 }
 
 void add_zeros(Page& page, const record::Campaign& campaign) {
-    std::vector<std::vector<std::string>> rows{
-        {"from run, position", "zero x mg", "y", "z", "vertical uncertain by, ppm"}};
+    Rows rows{{"from run, position", "zero x mg", "y", "z", "vertical uncertain by, ppm"}};
     const record::Order* before = nullptr;
     for (const auto& order : campaign.orders) {
         const bool none = order.zero_g == std::array<double, 3>{};

@@ -42,14 +42,12 @@ std::size_t every_of(const std::vector<record::EstimateRow>& rows) {
 Chart deviations(const Campaign& campaign, const Group& group) {
     const auto& rows = campaign.estimates;
     const double origin = drivers::to_seconds(campaign.samples.front().time);
-    Chart chart;
-    chart.title = std::string(group.title) + ": standard deviation";
-    chart.x = Axis("time, s");
-    chart.y = Axis(std::string("1 sigma, ") + group.unit, true);
+    Chart chart{.title = std::string(group.title) + ": standard deviation",
+                .x = Axis("time, s"),
+                .y = Axis(std::string("1 sigma, ") + group.unit, true)};
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         // The best and the worst of a gyro; all between them.
-        Curve curve;
-        curve.name = std::string("gyro ") + kGyro[gyro];
+        Curve curve{.name = std::string("gyro ") + kGyro[gyro]};
         // One term each is the same for all three, often: none may hide another, and dots stand
         // far enough apart for the lines between them.
         if (group.of.size() == 1) curve.look = kLooks[gyro];
@@ -64,8 +62,8 @@ Chart deviations(const Campaign& campaign, const Group& group) {
                 most = std::max(most, s);
                 log_sum += std::log(std::max(s, 1e-300));
             }
-            curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            curve.y.push_back(std::exp(log_sum / static_cast<double>(group.of.size())));
+            curve.add(drivers::to_seconds(rows[i].time) - origin,
+                      std::exp(log_sum / static_cast<double>(group.of.size())));
             if (group.of.size() == 1) continue;
             curve.low.push_back(least);
             curve.high.push_back(most);
@@ -78,13 +76,11 @@ Chart deviations(const Campaign& campaign, const Group& group) {
 Chart distances(const Campaign& campaign, const Coefficients& last) {
     const auto& rows = campaign.estimates;
     const double origin = drivers::to_seconds(campaign.samples.front().time);
-    Chart chart;
-    chart.title = "Estimates on the way to their final values";
-    chart.x = Axis("time, s");
-    chart.y = Axis("distance from the final value, final sigmas", true);
+    Chart chart{.title = "Estimates on the way to their final values",
+                .x = Axis("time, s"),
+                .y = Axis("distance from the final value, final sigmas", true)};
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
-        Curve curve;
-        curve.name = std::string("gyro ") + kGyro[gyro];
+        Curve curve{.name = std::string("gyro ") + kGyro[gyro]};
         for (std::size_t i = 0; i < rows.size(); i += every_of(rows)) {
             double square = 0;
             for (std::size_t k = 0; k < estimator::kGroups; ++k) {
@@ -92,8 +88,7 @@ Chart distances(const Campaign& campaign, const Coefficients& last) {
                 const double d = (rows[i].value[p] - last.value[p]) / last.sigma[p];
                 square += d * d / estimator::kGroups;
             }
-            curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            curve.y.push_back(std::sqrt(square));
+            curve.add(drivers::to_seconds(rows[i].time) - origin, std::sqrt(square));
         }
         chart.curves.push_back(std::move(curve));
     }
@@ -103,9 +98,7 @@ Chart distances(const Campaign& campaign, const Coefficients& last) {
 /// Two level lines, one either way.
 void add_limits(Chart& chart, const char* name, double from, double to, double limit) {
     for (const double sign : {-1.0, 1.0}) {
-        Curve curve;
-        curve.name = sign > 0 ? name : "";
-        curve.look = Look::dashed;
+        Curve curve{.name = sign > 0 ? name : "", .look = Look::dashed};
         curve.x = {from, to};
         curve.y = {sign * limit, sign * limit};
         chart.curves.push_back(std::move(curve));
@@ -113,14 +106,9 @@ void add_limits(Chart& chart, const char* name, double from, double to, double l
 }
 
 Chart over_time(const Innovations& found) {
-    Chart chart;
-    chart.title = "Innovations";
-    chart.x = Axis("time, s");
-    chart.y = Axis("arcsec");
+    Chart chart{.title = "Innovations", .x = Axis("time, s"), .y = Axis("arcsec")};
     for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = kAxis[k];
-        curve.look = Look::dots;
+        Curve curve{.name = kAxis[k], .look = Look::dots};
         curve.x = found.time_s;
         curve.y = found.arcsec[k];
         chart.curves.push_back(std::move(curve));
@@ -132,18 +120,15 @@ Chart over_time(const Innovations& found) {
 }
 
 void add_whiteness(Page& page, const Innovations& found) {
-    Chart white;
-    white.title = "Whiteness: autocorrelation of the innovations";
-    white.x = Axis("lag, samples");
-    white.y = Axis("correlation");
+    Chart white{.title = "Whiteness: autocorrelation of the innovations",
+                .x = Axis("lag, samples"),
+                .y = Axis("correlation")};
     const double limit = k95 / std::sqrt(static_cast<double>(found.count));
     std::size_t outside = 0, all = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = kAxis[k];
+        Curve curve{.name = kAxis[k]};
         for (std::size_t lag = 1; lag < found.correlation[k].size(); ++lag) {
-            curve.x.push_back(static_cast<double>(lag));
-            curve.y.push_back(found.correlation[k][lag]);
+            curve.add(static_cast<double>(lag), found.correlation[k][lag]);
             ++all;
             if (std::abs(found.correlation[k][lag]) > limit) ++outside;
         }
@@ -157,27 +142,20 @@ void add_whiteness(Page& page, const Innovations& found) {
 }
 
 void add_nis(Page& page, const Analysis& a) {
-    Chart nis;
-    nis.title = "Normalised innovations squared, dwell by dwell";
-    nis.x = Axis("dwell");
-    nis.y = Axis("per degree of freedom");
-    Curve values, low, high;
-    values.look = Look::dots;
-    values.name = "dwell";
-    low.look = high.look = Look::dashed;
-    high.name = "95 % if consistent";
+    Chart nis{.title = "Normalised innovations squared, dwell by dwell",
+              .x = Axis("dwell"),
+              .y = Axis("per degree of freedom")};
+    Curve values{.name = "dwell", .look = Look::dots}, low{.look = Look::dashed};
+    Curve high{.name = "95 % if consistent", .look = Look::dashed};
     for (std::size_t i = 0; i < a.replayed.dwells.size(); ++i) {
         const auto& s = a.replayed.dwells[i].summary;
         if (s.used == 0) continue;
         // chi-square with 3 n degrees of freedom: variance 2 / (3 n) of its mean.
         const double spread = k95 * std::sqrt(2.0 / (3.0 * s.used));
         const auto x = static_cast<double>(i + 1);
-        values.x.push_back(x);
-        values.y.push_back(s.nis_per_dof);
-        low.x.push_back(x);
-        low.y.push_back(1 - spread);
-        high.x.push_back(x);
-        high.y.push_back(1 + spread);
+        values.add(x, s.nis_per_dof);
+        low.add(x, 1 - spread);
+        high.add(x, 1 + spread);
     }
     nis.curves = {values, low, high};
     page.figure(nis.svg(), fmt::format("Over the campaign {:.4f}.", a.replayed.result.nis_per_dof));
@@ -214,18 +192,13 @@ void add_innovations(Page& page, const Analysis& a) {
 
 void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
     page.section("noise", "Gyro noise");
-    Chart chart;
-    chart.title = "Allan deviation of the residual rates";
-    chart.x = Axis("averaging time, s", true);
-    chart.y = Axis("deg/h", true);
+    Chart chart{.title = "Allan deviation of the residual rates",
+                .x = Axis("averaging time, s", true),
+                .y = Axis("deg/h", true)};
     for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = std::string("gyro ") + kGyro[k];
+        Curve curve{.name = std::string("gyro ") + kGyro[k]};
         for (const auto& point : a.allan[k]) {
-            curve.x.push_back(point.tau);
-            curve.y.push_back(point.dev);
-            curve.low.push_back(point.lo);
-            curve.high.push_back(point.hi);
+            curve.add(point.tau, point.dev, point.lo, point.hi);
         }
         curve.look = Look::dots;
         chart.curves.push_back(std::move(curve));

@@ -31,7 +31,7 @@ void add_lead(Page& page, const record::Campaign& campaign, const record::Replay
     page.paragraph(std::string("Drift of a gyro, deg/h: ") + kDriftModel + ".");
     page.paragraph(told_conditions(campaign));
     std::size_t offered = 0, rejected = 0;
-    std::vector<std::vector<std::string>> rows{{"run, position", "samples rejected", "why"}};
+    Rows rows{{"run, position", "samples rejected", "why"}};
     for (const auto& dwell : replayed.dwells) {
         const auto& s = dwell.summary;
         offered += s.samples;

@@ -63,7 +63,7 @@ void Page::section(const std::string& id, const std::string& title) {
 
 void Page::paragraph(const std::string& text) { body_ += "<p>" + xml_text(text) + "</p>\n"; }
 
-void Page::table(const std::vector<std::vector<std::string>>& rows, const std::string& kind) {
+void Page::table(const Rows& rows, const std::string& kind) {
     body_ += "<div class=\"wide\"><table" + (kind.empty() ? "" : " class=\"" + kind + "\"") + ">\n";
     for (std::size_t i = 0; i < rows.size(); ++i) {
         body_ += i == 0 ? "<thead><tr>" : "<tr>";

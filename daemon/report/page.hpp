@@ -5,13 +5,16 @@
 
 namespace vibrig::report {
 
+/// Of a table. First row: heads.
+using Rows = std::vector<std::vector<std::string>>;
+
 /// HTML in the order in which it is written.
 class Page {
   public:
     void section(const std::string& id, const std::string& title);
     void paragraph(const std::string& text);
-    /// First row: heads. Cells are escaped; one that starts with '!' stands out.
-    void table(const std::vector<std::vector<std::string>>& rows, const std::string& kind = "");
+    /// Cells are escaped; one that starts with '!' stands out.
+    void table(const Rows& rows, const std::string& kind = "");
     void figure(const std::string& svg, const std::string& caption);
     void details(const std::string& summary, const std::string& preformatted);
     /// Across every page, such as "SIMULATED".

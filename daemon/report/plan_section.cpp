@@ -105,7 +105,7 @@ void add_plan(Page& page, const Campaign& campaign, const Analysis& analysis) {
 }
 
 void add_files(Page& page, const Campaign& campaign) {
-    std::vector<std::vector<std::string>> rows{{"File", "State", "Samples", "Bytes", "SHA-256"}};
+    Rows rows{{"File", "State", "Samples", "Bytes", "SHA-256"}};
     const auto add = [&rows](const std::string& path, const std::string& state,
                              const std::string& samples) {
         rows.push_back({fs::path(path).filename().string(), state, samples,

@@ -23,7 +23,7 @@ std::string limit_text(const json& row) {
 }
 
 void add_rows(Page& page, const json& newest) {
-    std::vector<std::vector<std::string>> rows{{"Proved", "Value", "Unit", "Expected"}};
+    Rows rows{{"Proved", "Value", "Unit", "Expected"}};
     for (const json& row : newest.at("rows")) {
         const bool passed = row.at("passed");
         rows.push_back({row.at("name"),
@@ -40,19 +40,16 @@ void add_rows(Page& page, const json& newest) {
 /// Stop times over the days: a contactor that wears shows.
 void add_trend(Page& page, const json& proof) {
     const json& history = proof.at("history");
-    tool::plot::Chart chart;
-    chart.title = "Stop times of the proofs";
-    chart.x = tool::plot::Axis("days before the newest proof", false);
-    chart.y = tool::plot::Axis("s", false);
+    Chart chart{.title = "Stop times of the proofs",
+                .x = Axis("days before the newest proof", false),
+                .y = Axis("s", false)};
     const double newest = proof.at("newest").at("utc_ns");
     for (const char* name : {"stop, table", "stop, platform", "watchdog, rest"}) {
-        tool::plot::Curve curve;
-        curve.name = name;
-        curve.look = tool::plot::Look::dots;
+        Curve curve{.name = name, .look = Look::dots};
         for (const json& past : history) {
             if (!past.at("times_s").contains(name)) continue;
-            curve.x.push_back((past.at("utc_ns").get<double>() - newest) / kDay_ns);
-            curve.y.push_back(past.at("times_s").at(name));
+            curve.add((past.at("utc_ns").get<double>() - newest) / kDay_ns,
+                      past.at("times_s").at(name));
         }
         if (curve.x.size() > 1) chart.curves.push_back(std::move(curve));
     }

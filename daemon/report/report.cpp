@@ -73,25 +73,24 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
     const auto& head = campaign.head;
     page.section("campaign", "Campaign");
     const auto unit = paperwork_of(campaign);
-    std::vector<std::vector<std::string>> rows{
-        {"", ""},
-        {"Unit under test", unit_text(unit)},
-        {"Operator", or_dash(head.started_by)},
-        {"Started", utc_text(head.utc_ns)},
-        {"Ended", campaign.ended_utc_ns > 0 ? utc_text(campaign.ended_utc_ns) : "not closed"},
-        {"State", campaign.state + (campaign.reason.empty() ? "" : ": " + campaign.reason)},
-        {"Recorded by",
-         "vibrigd " + head.version + ", " + head.compiler + ", " + head.instruction_set},
-        {"Report by", std::string("vibrig ") + kVersion + ", " +
-                          std::string(estimator::compiler()) + ", " +
-                          std::string(estimator::instruction_set())},
-        {"Replay",
-         a.replayed.compared == 0 ? "no dwell to compare"
-         : a.replayed.different == 0
-             ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
-                           a.replayed.compared)
-             : "!differs from the recording: " + a.replayed.first_difference},
-        {"Configuration", "SHA-256 " + record::sha256_of_text(head.configuration)}};
+    Rows rows{{"", ""},
+              {"Unit under test", unit_text(unit)},
+              {"Operator", or_dash(head.started_by)},
+              {"Started", utc_text(head.utc_ns)},
+              {"Ended", campaign.ended_utc_ns > 0 ? utc_text(campaign.ended_utc_ns) : "not closed"},
+              {"State", campaign.state + (campaign.reason.empty() ? "" : ": " + campaign.reason)},
+              {"Recorded by",
+               "vibrigd " + head.version + ", " + head.compiler + ", " + head.instruction_set},
+              {"Report by", std::string("vibrig ") + kVersion + ", " +
+                                std::string(estimator::compiler()) + ", " +
+                                std::string(estimator::instruction_set())},
+              {"Replay",
+               a.replayed.compared == 0 ? "no dwell to compare"
+               : a.replayed.different == 0
+                   ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
+                                 a.replayed.compared)
+                   : "!differs from the recording: " + a.replayed.first_difference},
+              {"Configuration", "SHA-256 " + record::sha256_of_text(head.configuration)}};
     if (!campaign.mark.empty()) rows.push_back({"Marked", "!" + campaign.mark});
     if (campaign.parts.size() > 1)
         rows.push_back(
@@ -100,8 +99,7 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
     add_journal(page, campaign, a.journal);
     add_files(page, campaign);
     if (!unit.instruments.empty()) {
-        std::vector<std::vector<std::string>> table{
-            {"Instrument", "Serial number", "Certificate", "Uncertainty", "Due", ""}};
+        Rows table{{"Instrument", "Serial number", "Certificate", "Uncertainty", "Due", ""}};
         const std::string day = utc_text(head.utc_ns).substr(0, 10);
         for (const auto& i : unit.instruments)
             table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate),
@@ -115,9 +113,8 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
 
 void add_coefficients(Page& page, const Analysis& a) {
     page.section("coefficients", "Coefficients");
-    std::vector<std::vector<std::string>> rows{{"coefficient", "value", "sigma", "95 % from",
-                                                "95 % to", "unit", "expected sigma", "efficiency",
-                                                "correlates with"}};
+    Rows rows{{"coefficient", "value", "sigma", "95 % from", "95 % to", "unit", "expected sigma",
+               "efficiency", "correlates with"}};
     for (std::size_t i = 0; i < kParameters; ++i) {
         const char* name = estimator::parameter_names()[i];
         if (!a.coefficients.observable[i]) {
@@ -162,23 +159,18 @@ void add_coefficients(Page& page, const Analysis& a) {
 void add_held_out(Page& page, const Analysis& a) {
     page.section("drift", "Drift before and after");
     if (a.held_out.empty()) return page.paragraph("One position only: nothing can be held out.");
-    Chart chart;
-    chart.title = "Drift on positions held out from the fit";
-    chart.x = Axis("dwell");
-    chart.y = Axis("drift, absolute, deg/h", true);
+    Chart chart{.title = "Drift on positions held out from the fit",
+                .x = Axis("dwell"),
+                .y = Axis("drift, absolute, deg/h", true)};
     std::array<double, 2> square{};
     std::size_t count = 0, within = 0;
-    Curve before, after;
-    before.name = "before";
-    after.name = "after";
-    before.look = after.look = Look::dots;
+    Curve before{.name = "before", .look = Look::dots}, after{.name = "after", .look = Look::dots};
     for (std::size_t k = 0; k < 3; ++k) {
         for (std::size_t i = 0; i < a.held_out.size(); ++i) {
             const HeldOut& h = a.held_out[i];
-            before.x.push_back(static_cast<double>(i + 1));
-            after.x.push_back(static_cast<double>(i + 1));
-            before.y.push_back(std::abs(h.before_dph[k]));
-            after.y.push_back(h.determined ? std::abs(h.after_dph[k]) : std::nan(""));
+            const auto dwell = static_cast<double>(i + 1);
+            before.add(dwell, std::abs(h.before_dph[k]));
+            after.add(dwell, h.determined ? std::abs(h.after_dph[k]) : std::nan(""));
             if (!h.determined) continue;
             square[0] += h.before_dph[k] * h.before_dph[k];
             square[1] += h.after_dph[k] * h.after_dph[k];
@@ -200,8 +192,8 @@ void add_held_out(Page& page, const Analysis& a) {
             std::sqrt(square[1] / static_cast<double>(count)), std::sqrt(square[0] / square[1]),
             within, count, 100.0 * static_cast<double>(within) / static_cast<double>(count)));
     }
-    std::vector<std::vector<std::string>> rows{{"run, position", "table g", "before x", "y", "z",
-                                                "after x", "y", "z", "sigma x", "y", "z"}};
+    Rows rows{{"run, position", "table g", "before x", "y", "z", "after x", "y", "z", "sigma x",
+               "y", "z"}};
     for (const auto& h : a.held_out) {
         std::vector<std::string> row{fmt::format("{}, {}", h.run, h.position), num(h.table_g, 2)};
         for (const double v : h.before_dph) row.push_back(num(v, 4));
@@ -226,14 +218,12 @@ void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
     if (!rows.empty()) {
         const double origin = drivers::to_seconds(campaign.samples.front().time);
         const std::size_t every = std::max<std::size_t>(1, rows.size() / kMostShown);
-        Curve amplitude, frequency;
+        Curve amplitude{.look = Look::dots}, frequency{.look = Look::dots};
         for (std::size_t i = 0; i < rows.size(); i += every) {
-            amplitude.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            amplitude.y.push_back(rows[i].amplitude_g);
-            frequency.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            frequency.y.push_back(rows[i].frequency_hz > 0 ? rows[i].frequency_hz : std::nan(""));
+            amplitude.add(drivers::to_seconds(rows[i].time) - origin, rows[i].amplitude_g);
+            frequency.add(drivers::to_seconds(rows[i].time) - origin,
+                          rows[i].frequency_hz > 0 ? rows[i].frequency_hz : std::nan(""));
         }
-        amplitude.look = frequency.look = Look::dots;
         for (auto* curve : {&amplitude, &frequency}) {
             Chart chart;
             const bool is_amplitude = curve == &amplitude;
@@ -244,9 +234,8 @@ void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
             page.figure(chart.svg(), "As the filter saw it in its dwells.");
         }
     }
-    std::vector<std::vector<std::string>> table{{"run, position", "angles deg", "table g",
-                                                 "platform g", "Hz", "kappa", "samples", "rejected",
-                                                 "NIS", "force g", ""}};
+    Rows table{{"run, position", "angles deg", "table g", "platform g", "Hz", "kappa", "samples",
+                "rejected", "NIS", "force g", ""}};
     const auto dwells = record::recorded_dwells(campaign);
     for (std::size_t i = 0; i < dwells.size() && i < a.replayed.dwells.size(); ++i) {
         const auto& s = a.replayed.dwells[i].summary;
@@ -300,8 +289,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
             unit.unit_serial != earlier->paperwork.unit_serial)
             page.paragraph("Warning: this is another unit than that of this campaign, " +
                            unit_text(unit) + ".");
-        std::vector<std::vector<std::string>> rows{
-            {"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
+        Rows rows{{"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
         double square = 0;
         std::size_t count = 0, apart = 0;
         for (std::size_t i = 0; i < kParameters; ++i) {
@@ -331,7 +319,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     }
 
     page.section("events", "Events");
-    std::vector<std::vector<std::string>> rows{{"UTC", "", "from", "what"}};
+    Rows rows{{"UTC", "", "from", "what"}};
     for (const auto& event : campaign.events) {
         const std::string severity = name_of(event.severity);
         const bool bad = event.severity == Severity::alarm || event.severity == Severity::trip;
@@ -341,7 +329,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     page.table(rows, "words");
     if (!campaign.gaps.empty()) {
         page.paragraph("Missing in the recording:");
-        std::vector<std::vector<std::string>> gaps{{"stream", "lost", "why"}};
+        Rows gaps{{"stream", "lost", "why"}};
         for (const auto& gap : campaign.gaps)
             gaps.push_back({gap.stream, fmt::to_string(gap.lost), gap.reason});
         page.table(gaps, "words");

@@ -29,10 +29,9 @@ void name_coefficients(Axis& axis, std::size_t every) {
 }  // namespace
 
 Chart correlation_chart(const std::function<double(std::size_t, std::size_t)>& correlation) {
-    Chart chart;
-    chart.title = "Correlation of the coefficients";
-    chart.x = Axis("coefficient, in the order of the table");
-    chart.y = Axis("coefficient");
+    Chart chart{.title = "Correlation of the coefficients",
+                .x = Axis("coefficient, in the order of the table"),
+                .y = Axis("coefficient")};
     name_coefficients(chart.x, 5);
     name_coefficients(chart.y, 2);
     tool::plot::HeatMap map;
@@ -56,14 +55,10 @@ Chart residuals_chart(const Assessment& of) {
     chart.x.label = "time since the first dwell, h";
     chart.y.label = "deg/h";
     for (std::size_t j = 0; j < 3; ++j) {
-        Curve curve;
-        curve.name = fmt::format("gyro {}", "xyz"[j]);
-        curve.look = Look::dots;
+        Curve curve{.name = fmt::format("gyro {}", "xyz"[j]), .look = Look::dots};
         for (const auto& dwell : of.rates) {
-            curve.x.push_back(dwell.time_h);
-            curve.y.push_back(dwell.residual[j]);
-            curve.low.push_back(dwell.residual[j] - dwell.residual_sigma[j]);
-            curve.high.push_back(dwell.residual[j] + dwell.residual_sigma[j]);
+            curve.add(dwell.time_h, dwell.residual[j], dwell.residual[j] - dwell.residual_sigma[j],
+                      dwell.residual[j] + dwell.residual_sigma[j]);
         }
         chart.curves.push_back(std::move(curve));
     }
@@ -71,17 +66,14 @@ Chart residuals_chart(const Assessment& of) {
 }
 
 Chart uncertainties_chart(const estimator::Result& result, const Assessment& of) {
-    Chart chart;
-    chart.title = "Standard uncertainty of the coefficients";
-    chart.x = Axis("coefficient, in the order of the table");
-    chart.y = Axis("deg/h, deg/h/g, deg/h/g^2", true);
+    Chart chart{.title = "Standard uncertainty of the coefficients",
+                .x = Axis("coefficient, in the order of the table"),
+                .y = Axis("deg/h, deg/h/g, deg/h/g^2", true)};
     name_coefficients(chart.x, 5);
     chart.x.low = 0.5;
     chart.x.high = static_cast<double>(kParameters) + 0.5;
-    Curve noise, combined;
-    noise.name = "sigma of noise alone";
-    combined.name = "combined, u";
-    noise.look = combined.look = Look::dots;
+    Curve noise{.name = "sigma of noise alone", .look = Look::dots};
+    Curve combined{.name = "combined, u", .look = Look::dots};
     for (std::size_t i = 0; i < kParameters; ++i) {
         for (auto* curve : {&noise, &combined}) curve->x.push_back(static_cast<double>(i + 1));
         noise.y.push_back(result.observable[i] ? result.sigma[i] : std::nan(""));

@@ -16,6 +16,11 @@
 
 namespace vibrig::report {
 
+using tool::plot::Axis;
+using tool::plot::Chart;
+using tool::plot::Curve;
+using tool::plot::Look;
+
 namespace {
 
 using SpectrumJson = nlohmann::json;
@@ -55,7 +60,7 @@ void add_flatness(Page& page, const SpectrumJson& flat) {
 
 void add_sweeps(Page& page, const SpectrumJson& sweeps) {
     if (!sweeps.is_array() || sweeps.empty()) return;
-    std::vector<std::vector<std::string>> rows{{"sweep: run, position", "from", "to", "s", "used"}};
+    Rows rows{{"sweep: run, position", "from", "to", "s", "used"}};
     for (const SpectrumJson& one : sweeps)
         rows.push_back(
             {fmt::format("{}, {}", one.at("run").get<int>(), one.at("position").get<int>()),
@@ -66,8 +71,7 @@ void add_sweeps(Page& page, const SpectrumJson& sweeps) {
 
 void add_evidence(Page& page, const SpectrumJson& spectrum) {
     add_flatness(page, spectrum.at("flat"));
-    std::vector<std::vector<std::string>> rows{
-        {"gyro", "log odds", "resonance, Hz", "95 %", "damping", "95 %"}};
+    Rows rows{{"gyro", "log odds", "resonance, Hz", "95 %", "damping", "95 %"}};
     for (std::size_t j = 0; j < 3; ++j) {
         // One, several, or none that is told.
         SpectrumJson list = spectrum.at("resonance").at(j);
@@ -90,7 +94,7 @@ void add_evidence(Page& page, const SpectrumJson& spectrum) {
 
 /// Six coefficients of each gyro, as the dwells of each frequency have them.
 void add_groups(Page& page, const SpectrumJson& frequencies) {
-    std::vector<std::vector<std::string>> rows{{"coefficient"}};
+    Rows rows{{"coefficient"}};
     for (const SpectrumJson& at : frequencies)
         rows.front().push_back(
             fmt::format("{} ({} dwells)", name_of_group(at), at.at("dwells").get<int>()));
@@ -129,10 +133,9 @@ std::pair<double, double> at_frequency(const SpectrumJson& one, std::size_t term
 }
 
 /// Over the frequencies, with its band of 95 %; the inputs that are declared are not in it.
-tool::plot::Curve curve_of(const SpectrumJson& mixture, std::size_t term, double low, double high) {
+Curve curve_of(const SpectrumJson& mixture, std::size_t term, double low, double high) {
     constexpr int kPoints = 200;
-    tool::plot::Curve curve;
-    curve.name = kTerms[term];
+    Curve curve{.name = kTerms[term]};
     for (int i = 0; i <= kPoints; ++i) {
         const double hz = low * std::pow(high / low, static_cast<double>(i) / kPoints);
         double mean = 0, square = 0;
@@ -143,10 +146,7 @@ tool::plot::Curve curve_of(const SpectrumJson& mixture, std::size_t term, double
             square += w * (variance + value * value);
         }
         const double wide = kNinetyFive * std::sqrt(std::max(0.0, square - mean * mean));
-        curve.x.push_back(hz);
-        curve.y.push_back(mean);
-        curve.low.push_back(mean - wide);
-        curve.high.push_back(mean + wide);
+        curve.add(hz, mean, mean - wide, mean + wide);
     }
     return curve;
 }
@@ -167,24 +167,18 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
     if (!(high > low)) return;
     for (std::size_t j = 0; j < 3; ++j) {
         for (std::size_t term = 0; term < kTerms.size(); ++term) {
-            tool::plot::Chart chart;
-            chart.title = fmt::format("D_{}{} over frequency", kTerms[term], "xyz"[j]);
-            chart.x = tool::plot::Axis("Hz", true);
-            chart.y = tool::plot::Axis("deg/h/g^2");
+            Chart chart{.title = fmt::format("D_{}{} over frequency", kTerms[term], "xyz"[j]),
+                        .x = Axis("Hz", true),
+                        .y = Axis("deg/h/g^2")};
             chart.curves.push_back(
                 curve_of(spectrum.at("mixture").at(j), term, low / 1.5, 1.5 * high));
             chart.curves.back().name = "model, 95 %";
-            tool::plot::Curve dwells;
-            dwells.name = "dwells of one frequency, 95 %";
-            dwells.look = tool::plot::Look::dots;
+            Curve dwells{.name = "dwells of one frequency, 95 %", .look = Look::dots};
             for (const SpectrumJson& at : frequencies) {
                 if (at_random(at)) continue;  // a mean over its band is no point of the curve
                 const double value = at.at("coefficients").at(6 * j + term).get<double>();
                 const double wide = kNinetyFive * at.at("sigma").at(6 * j + term).get<double>();
-                dwells.x.push_back(at.at("hz").get<double>());
-                dwells.y.push_back(value);
-                dwells.low.push_back(value - wide);
-                dwells.high.push_back(value + wide);
+                dwells.add(at.at("hz").get<double>(), value, value - wide, value + wide);
             }
             chart.curves.push_back(std::move(dwells));
             page.figure(chart.svg(), chart.title);
@@ -195,34 +189,27 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
 /// Where the power of the profiles lies, beside the frequencies of the sines.
 void add_profiles(Page& page, const SpectrumJson& frequencies, const record::Campaign& campaign) {
     if (std::ranges::none_of(frequencies, at_random)) return;
-    tool::plot::Chart chart;
-    chart.title = "Profiles under which it shook";
-    chart.x = tool::plot::Axis("Hz", true);
-    chart.y = tool::plot::Axis("g^2/Hz", true);
+    Chart chart{
+        .title = "Profiles under which it shook", .x = Axis("Hz", true), .y = Axis("g^2/Hz", true)};
     double least = std::numeric_limits<double>::infinity();
     for (const auto& one : configuration_of(campaign).profiles) {
         if (std::ranges::none_of(frequencies, [&](const SpectrumJson& at) {
                 return at_random(at) && at.at("profile") == one.profile.name;
             }))
             continue;
-        tool::plot::Curve curve;
-        curve.name = one.profile.name;
+        Curve curve{.name = one.profile.name};
         for (const auto& [hz, density] :
              one.controller_psd.empty() ? one.profile.psd : one.controller_psd) {
-            curve.x.push_back(hz);
-            curve.y.push_back(density);
+            curve.add(hz, density);
             least = std::min(least, density);
         }
         chart.curves.push_back(std::move(curve));
     }
     if (chart.curves.empty()) return;
-    tool::plot::Curve sines;
-    sines.name = "sines, at the foot";
-    sines.look = tool::plot::Look::dots;
+    Curve sines{.name = "sines, at the foot", .look = Look::dots};
     for (const SpectrumJson& at : frequencies) {
         if (at_random(at)) continue;
-        sines.x.push_back(at.at("hz").get<double>());
-        sines.y.push_back(least);
+        sines.add(at.at("hz").get<double>(), least);
     }
     if (!sines.x.empty()) chart.curves.push_back(std::move(sines));
     page.figure(chart.svg(), chart.title);
@@ -230,14 +217,11 @@ void add_profiles(Page& page, const SpectrumJson& frequencies, const record::Cam
 
 /// Measured over what the coefficients foretell, all gyros; what the fit has not seen apart.
 void add_predicted(Page& page, const SpectrumJson& root) {
-    tool::plot::Curve fitted, held, equal;
-    fitted.name = "dwells of the fit";
-    held.name = "held out";
-    equal.name = "as predicted";
-    fitted.look = held.look = tool::plot::Look::dots;
-    const auto add = [&](tool::plot::Curve& to, double predicted, double measured) {
-        to.x.push_back(predicted);
-        to.y.push_back(measured);
+    Curve fitted{.name = "dwells of the fit", .look = Look::dots};
+    Curve held{.name = "held out", .look = Look::dots};
+    Curve equal{.name = "as predicted"};
+    const auto add = [&](Curve& to, double predicted, double measured) {
+        to.add(predicted, measured);
         equal.x.push_back(predicted);
     };
     for (const SpectrumJson& row : root.at("dwell_rates")) {
@@ -250,8 +234,8 @@ void add_predicted(Page& page, const SpectrumJson& root) {
     const SpectrumJson none = SpectrumJson::array();
     const auto found = root.at("spectrum").find("held_out");
     const SpectrumJson& apart = found != root.at("spectrum").end() ? *found : none;
-    std::vector<std::vector<std::string>> rows{{"run, position", "Hz or profile", "measured x", "y",
-                                                "z", "predicted x", "y", "z", "z x", "y", "z"}};
+    Rows rows{{"run, position", "Hz or profile", "measured x", "y", "z", "predicted x", "y", "z",
+               "z x", "y", "z"}};
     for (const SpectrumJson& row : apart) {
         std::vector<std::string> cells{
             fmt::format("{}, {}", row.at("run").get<int>(), row.at("position").get<int>()),
@@ -268,10 +252,9 @@ void add_predicted(Page& page, const SpectrumJson& root) {
     if (equal.x.empty()) return;
     const auto [low, high] = std::ranges::minmax(equal.x);
     equal.x = equal.y = {low, high};
-    tool::plot::Chart chart;
-    chart.title = "Drift predicted against measured";
-    chart.x = tool::plot::Axis("predicted, deg/h");
-    chart.y = tool::plot::Axis("measured, deg/h");
+    Chart chart{.title = "Drift predicted against measured",
+                .x = Axis("predicted, deg/h"),
+                .y = Axis("measured, deg/h")};
     chart.curves = {equal, fitted};
     if (!held.x.empty()) chart.curves.push_back(held);
     page.figure(chart.svg(), "All three gyros, each dwell of each frequency.");

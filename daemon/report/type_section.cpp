@@ -32,8 +32,8 @@ void add_type(Page& page, const record::Campaign& campaign) {
             passes ? "passes for one of its type"
                    : "does not pass for one of its type at 1 %, which took no part in the choice "
                      "once that was seen"));
-        std::vector<std::vector<std::string>> rows{{"coefficient", "without", "u", "with the type",
-                                                    "u", "type's mean", "scatter", "unit"}};
+        Rows rows{{"coefficient", "without", "u", "with the type", "u", "type's mean", "scatter",
+                   "unit"}};
         for (std::size_t i = 0; i < type.at("parameters").size(); ++i) {
             const json& with = type.at("parameters")[i];
             const json& without = root.at("parameters").at(i);

@@ -46,9 +46,8 @@ std::string largest_parts(const uncertainty::Coefficient& c) {
     return text;
 }
 
-std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment& a) {
-    std::vector<std::vector<std::string>> rows{
-        {"coefficient", "value", "U", "k", "unit", "u", "noise alone", "largest parts of u"}};
+Rows budget_rows(const uncertainty::Assessment& a) {
+    Rows rows{{"coefficient", "value", "U", "k", "unit", "u", "noise alone", "largest parts of u"}};
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto& c = a.coefficients[i];
         const char* name = estimator::parameter_names()[i];
@@ -84,8 +83,7 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a, double covera
         page.paragraph("What would shrink it most: " + uncertainty::advice(of) + ".");
         break;
     }
-    std::vector<std::vector<std::string>> evidence{
-        {"what the dwells might show", "log of the odds against nothing"}};
+    Rows evidence{{"what the dwells might show", "log of the odds against nothing"}};
     for (const auto& e : a.evidence) {
         if (evidence.size() > kMostPatterns) break;
         evidence.push_back({uncertainty::name_of(e.pattern),
