@@ -46,7 +46,7 @@ class Reader {
                 if (node.value<std::string_view>() == kBlank)
                     blank(*known->second, places_[key]);
                 else
-                    known->second->read(node, configuration_, problems_);
+                    known->second->read({node, key, problems_}, configuration_);
             } else if (section) {
                 problems_.add(place_of(node.source()), key, describe(node), "a table");
             } else {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +16,18 @@ namespace vibrig::configuration {
 template <class T>
 using At = std::function<T&(Configuration&)>;
 
+/// At the end of a path of members, from the configuration on.
+template <class... Members>
+[[nodiscard]] constexpr auto at(Members... path) {
+    return [path...](Configuration & c) -> auto& { return (c.*....*path); };
+}
+
+/// at() for the members of one part of the configuration.
+template <class... Members>
+[[nodiscard]] constexpr auto part(Members... path) {
+    return [path...](auto... members) { return at(path..., members...); };
+}
+
 /// Both ends included.
 struct Range {
     double low;
@@ -23,52 +37,51 @@ struct Range {
 /// Empty: the text is fine; else what was expected.
 using TextRule = std::function<std::string(const std::string&)>;
 
-[[nodiscard]] Key number(std::string name, std::string unit, Range range, std::string doc,
-                         At<double> at);
-/// A number that is kept in another form than a person writes.
-[[nodiscard]] Key converted(std::string name, std::string unit, Range range, std::string doc,
-                            std::function<double(Configuration&)> get,
-                            std::function<void(Configuration&, double)> set);
-[[nodiscard]] Key milliseconds(std::string name, Range range, std::string doc,
-                               At<drivers::Time> at);
-[[nodiscard]] Key seconds(std::string name, Range range, std::string doc, At<drivers::Time> at);
-[[nodiscard]] Key integer(std::string name, std::string unit, int low, int high, std::string doc,
-                          std::function<int(Configuration&)> get,
-                          std::function<void(Configuration&, int)> set);
-[[nodiscard]] Key integer(std::string name, std::string unit, int low, int high, std::string doc,
-                          At<int> at);
-[[nodiscard]] Key boolean(std::string name, std::string doc, At<bool> at);
-[[nodiscard]] Key text(std::string name, std::string bounds, std::string doc, TextRule rule,
-                       At<std::string> at);
-/// One of some words, or one of some whole numbers.
+[[nodiscard]] Key number(std::string name, At<double> at, std::string unit, Range range,
+                         std::string doc);
+/// A time that a person writes as a number: `shown` makes it one, `kept` a time of it.
+[[nodiscard]] Key converted(std::string name, At<drivers::Time> at, std::string unit, Range range,
+                            std::string doc, double (*shown)(drivers::Time),
+                            drivers::Time (*kept)(double));
+[[nodiscard]] Key milliseconds(std::string name, At<drivers::Time> at, Range range,
+                               std::string doc);
+[[nodiscard]] Key seconds(std::string name, At<drivers::Time> at, Range range, std::string doc);
+[[nodiscard]] Key integer(std::string name, At<int> at, std::string unit, int low, int high,
+                          std::string doc);
+[[nodiscard]] Key integer(std::string name, At<std::uint16_t> at, std::string unit, int low,
+                          int high, std::string doc);
+[[nodiscard]] Key boolean(std::string name, At<bool> at, std::string doc);
+[[nodiscard]] Key text(std::string name, At<std::string> at, std::string bounds, std::string doc,
+                       TextRule rule);
+/// One of some words, by its place among them.
 [[nodiscard]] Key choice(std::string name, std::vector<std::string> words, std::string doc,
                          std::function<std::size_t(Configuration&)> get,
                          std::function<void(Configuration&, std::size_t)> set);
-[[nodiscard]] Key sign(std::string name, std::string doc, At<int> at);
+[[nodiscard]] Key sign(std::string name, At<int> at, std::string doc);
 
-[[nodiscard]] Key triple(std::string name, std::string unit, Range range, std::string doc,
-                         At<std::array<double, 3>> at);
-[[nodiscard]] Key signs(std::string name, std::string doc, At<std::array<int, 3>> at);
-[[nodiscard]] Key matrix(std::string name, std::string doc,
-                         At<std::array<std::array<double, 3>, 3>> at);
-[[nodiscard]] Key axis(std::string name, std::string doc, At<estimator::SignedAxis> at);
-[[nodiscard]] Key axes(std::string name, std::string doc,
-                       At<std::array<estimator::SignedAxis, 3>> at);
-[[nodiscard]] Key numbers(std::string name, std::string unit, Range range, std::size_t at_most,
-                          std::string doc, At<std::vector<double>> at);
+[[nodiscard]] Key triple(std::string name, At<std::array<double, 3>> at, std::string unit,
+                         Range range, std::string doc);
+[[nodiscard]] Key signs(std::string name, At<std::array<int, 3>> at, std::string doc);
+[[nodiscard]] Key matrix(std::string name, At<std::array<std::array<double, 3>, 3>> at,
+                         std::string doc);
+[[nodiscard]] Key axis(std::string name, At<estimator::SignedAxis> at, std::string doc);
+[[nodiscard]] Key axes(std::string name, At<std::array<estimator::SignedAxis, 3>> at,
+                       std::string doc);
+[[nodiscard]] Key numbers(std::string name, At<std::vector<double>> at, std::string unit,
+                          Range range, std::size_t at_most, std::string doc);
 /// Names that differ, each of 1 to 40 printable characters.
-[[nodiscard]] Key names(std::string name, std::size_t at_most, std::string doc,
-                        At<std::vector<std::string>> at);
+[[nodiscard]] Key names(std::string name, At<std::vector<std::string>> at, std::size_t at_most,
+                        std::string doc);
 /// [lowest, highest] each of outer, inner and azimuth.
-[[nodiscard]] Key travels(std::string name, std::string doc,
-                          At<std::array<std::array<double, 2>, 3>> at);
-[[nodiscard]] Key positions(std::string name, std::size_t at_most, std::string doc,
-                            At<std::vector<std::array<double, 3>>> at);
+[[nodiscard]] Key travels(std::string name, At<std::array<std::array<double, 2>, 3>> at,
+                          std::string doc);
+[[nodiscard]] Key positions(std::string name, At<std::vector<std::array<double, 3>>> at,
+                            std::size_t at_most, std::string doc);
 
 /// choice() over an enumeration; the words stand in the order of `values`.
 template <class E>
-[[nodiscard]] Key choice(std::string name, std::vector<std::pair<std::string, E>> values,
-                         std::string doc, At<E> at) {
+[[nodiscard]] Key choice(std::string name, At<E> at, std::vector<std::pair<std::string, E>> values,
+                         std::string doc) {
     std::vector<std::string> words;
     for (const auto& [word, value] : values) {
         words.push_back(word);

@@ -25,6 +25,7 @@ class Problems {
   public:
     void add(Place place, std::string key, std::string found, std::string expected);
     [[nodiscard]] bool empty() const { return problems_.empty(); }
+    [[nodiscard]] std::size_t count() const { return problems_.size(); }
     /// True if the key itself, or something within it, has a problem already.
     [[nodiscard]] bool concern(const std::string& key) const;
     /// "file:line:column: key: found X, expected Y", one per line in the order of the file.

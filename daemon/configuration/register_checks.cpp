@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -16,42 +15,6 @@ using proto::Access;
 using proto::Register;
 using proto::RegisterTable;
 using proto::RegisterType;
-
-std::string name_of(const Register& reg) {
-    switch (reg.type) {
-        case RegisterType::u16:
-            return "u16";
-        case RegisterType::i16:
-            return "i16";
-        case RegisterType::u32:
-            return "u32";
-        case RegisterType::i32:
-            return "i32";
-        case RegisterType::f32:
-            return "f32";
-        case RegisterType::bits:
-            return "bits";
-    }
-    return "?";
-}
-
-double largest(RegisterType type) {
-    switch (type) {
-        case RegisterType::u16:
-            return 65'535;
-        case RegisterType::i16:
-            return 32'767;
-        case RegisterType::u32:
-            return 4'294'967'295.0;
-        case RegisterType::i32:
-            return 2'147'483'647.0;
-        case RegisterType::f32:
-            return static_cast<double>(std::numeric_limits<float>::max());
-        case RegisterType::bits:
-            return 1;
-    }
-    return 0;
-}
 
 }  // namespace
 
@@ -134,7 +97,7 @@ void CrossCheck::random_registers() {
                                 const char* expected) {
         if (good) return;
         const std::string key = std::string("shaker.registers.") + role;
-        refuse({key + ".type", key + ".address"}, name_of(reg), expected);
+        refuse({key + ".type", key + ".address"}, row_of(reg.type).word, expected);
     };
     using enum RegisterType;
     const RegisterType level = random->profile_level_db.type;
@@ -158,7 +121,8 @@ void CrossCheck::psd_block(const proto::PsdBlock& block) {
     if (!places_.contains(key + ".address"))
         problems_.add({}, key + ".address", "nothing", "an address: of the first pair");
     if (block.first.type != RegisterType::f32)
-        refuse({key + ".type", key + ".address"}, name_of(block.first), "f32: pairs of floats");
+        refuse({key + ".type", key + ".address"}, row_of(block.first.type).word,
+               "f32: pairs of floats");
     if (const int end = block.first.address + 4 * block.pairs; end > 65'536)
         refuse({key + ".pairs", key + ".address"},
                std::to_string(block.pairs) + " pairs from " + std::to_string(block.first.address),
@@ -182,7 +146,7 @@ void CrossCheck::sweep_registers() {
           std::pair{"actual_frequency", &sweep->actual_frequency}}) {
         const std::string key = std::string("shaker.registers.") + role;
         if (reg->type == RegisterType::bits)
-            refuse({key + ".type", key + ".address"}, name_of(*reg), "a number");
+            refuse({key + ".type", key + ".address"}, row_of(reg->type).word, "a number");
     }
 }
 
@@ -216,7 +180,7 @@ void CrossCheck::set_points_fit() {
     const proto::ShakerRegisters& r = c_.shaker.registers;
     const auto check = [this](const Register& reg, const std::string& role, double value,
                               const std::string& unit, const char* from) {
-        const double most = largest(reg.type) * reg.scale;
+        const double most = row_of(reg.type).largest * reg.scale;
         if (value > most) {
             const std::string key = "shaker.registers." + role;
             refuse({key + ".type", key + ".scale", from},

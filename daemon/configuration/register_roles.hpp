@@ -1,10 +1,30 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "drivers/shaker/shaker.hpp"
 
 namespace vibrig::configuration {
+
+struct RegisterTypeRow {
+    const char* word;
+    double largest;  ///< count
+};
+
+/// By proto::RegisterType.
+inline constexpr std::array<RegisterTypeRow, 6> kRegisterTypes{
+    {{"u16", 65'535},
+     {"i16", 32'767},
+     {"u32", 4'294'967'295.0},
+     {"i32", 2'147'483'647.0},
+     {"f32", std::numeric_limits<float>::max()},
+     {"bits", 1}}};
+[[nodiscard]] inline const RegisterTypeRow& row_of(proto::RegisterType type) {
+    return kRegisterTypes[static_cast<std::size_t>(type)];
+}
 
 struct RegisterRole {
     const char* name;  ///< of its table below shaker.registers

@@ -3,21 +3,16 @@
 namespace vibrig::configuration {
 
 const std::vector<Key>& schema() {
-    static const std::vector<Key> keys = [] {
-        std::vector<Key> all;
-        add_identification_keys(all);
-        add_spectrum_keys(all);
-        add_uncertainty_keys(all);
-        add_campaign_keys(all);
-        add_shaker_keys(all);
-        add_bus_keys(all);
-        add_guard_keys(all);
-        add_daemon_keys(all);
-        add_interlock_keys(all);
-        add_paperwork_keys(all);
-        return all;
-    }();
+    static const std::vector<Key> keys = joined(
+        {identification_keys(), spectrum_keys(), uncertainty_keys(), campaign_keys(), shaker_keys(),
+         bus_keys(), guard_keys(), daemon_keys(), interlock_keys(), paperwork_keys()});
     return keys;
+}
+
+std::vector<Key> joined(std::initializer_list<std::vector<Key>> parts) {
+    std::vector<Key> all;
+    for (const std::vector<Key>& part : parts) all.insert(all.end(), part.begin(), part.end());
+    return all;
 }
 
 }  // namespace vibrig::configuration

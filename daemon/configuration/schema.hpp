@@ -1,15 +1,15 @@
 #pragma once
 
-#include <toml++/toml.h>
-
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/configuration/problems.hpp"
 
 namespace vibrig::configuration {
+
+struct Entry;
 
 /// One key, declared once: reading, bounds, --check, --help and the manual come from here. Its
 /// default is what the settings struct is initialised with.
@@ -20,7 +20,7 @@ struct Key {
     std::string bounds;  ///< in words; empty: none
     std::string doc;
     /// Takes the value over or adds to the problems; never throws for what a person wrote.
-    std::function<void(const toml::node&, Configuration&, Problems&)> read;
+    std::function<void(const Entry&, Configuration&)> read;
     /// As TOML; empty: the key does not apply to this configuration.
     std::function<std::string(Configuration&)> write;
     /// JSON Schema of the value, one object; empty: what follows from the type.
@@ -31,16 +31,18 @@ struct Key {
 [[nodiscard]] const std::vector<Key>& schema();
 
 // The parts of the schema.
-void add_identification_keys(std::vector<Key>& keys);
-void add_response_keys(std::vector<Key>& keys);  ///< of the accelerometers
-void add_spectrum_keys(std::vector<Key>& keys);
-void add_uncertainty_keys(std::vector<Key>& keys);
-void add_campaign_keys(std::vector<Key>& keys);
-void add_shaker_keys(std::vector<Key>& keys);
-void add_bus_keys(std::vector<Key>& keys);
-void add_guard_keys(std::vector<Key>& keys);
-void add_daemon_keys(std::vector<Key>& keys);
-void add_interlock_keys(std::vector<Key>& keys);
-void add_paperwork_keys(std::vector<Key>& keys);
+[[nodiscard]] std::vector<Key> identification_keys();
+[[nodiscard]] std::vector<Key> response_keys();  ///< of the accelerometers
+[[nodiscard]] std::vector<Key> spectrum_keys();
+[[nodiscard]] std::vector<Key> uncertainty_keys();
+[[nodiscard]] std::vector<Key> campaign_keys();
+[[nodiscard]] std::vector<Key> shaker_keys();
+[[nodiscard]] std::vector<Key> bus_keys();
+[[nodiscard]] std::vector<Key> guard_keys();
+[[nodiscard]] std::vector<Key> daemon_keys();
+[[nodiscard]] std::vector<Key> interlock_keys();
+[[nodiscard]] std::vector<Key> paperwork_keys();
+/// One after the other.
+[[nodiscard]] std::vector<Key> joined(std::initializer_list<std::vector<Key>> parts);
 
 }  // namespace vibrig::configuration

@@ -13,50 +13,44 @@ namespace {
 using C = Configuration;
 using drivers::SignalBindings;
 
-void add_port_keys(std::vector<Key>& keys) {
-    using Kind = drivers::CanPortSettings::Kind;
-    keys.push_back(choice<Kind>(
-        "can.port", {{"socketcan", Kind::socketcan}, {"seqpacket", Kind::seqpacket}},
-        "the kernel's CAN, or a Unix socket that carries CAN frames",
-        [](C & c) -> auto& { return c.can.kind; }));
-    keys.push_back(text(
-        "can.interface", "1 to 15 characters", "socketcan: network interface", interface_rule,
-        [](C & c) -> auto& { return c.can.interface; }));
-    keys.push_back(text(
-        "can.path", "absolute or \"@name\"", "seqpacket: Unix socket; @: abstract name",
-        socket_or_empty_rule, [](C & c) -> auto& { return c.can.path; }));
-    keys.push_back(text(
-        "can.dbc", "a path", "DBC file of the bus; empty: the built-in rig.dbc", path_rule,
-        [](C & c) -> auto& { return c.dbc; }));
-    keys.push_back(
-        boolean("can.fd", "accept CAN FD frames", [](C& c) -> bool& { return c.can.fd; }));
-    keys.push_back(integer("can.receive_buffer", "byte", 4096, 1 << 30,
-                           "receive buffer of the socket",
-                           [](C& c) -> int& { return c.can.receive_buffer; }));
-    keys.push_back(converted(
-        "can.sample_rate_hz", "Hz", {1, 10'000}, "samples, that is sync counts, per second",
-        [](C& c) {
+std::vector<Key> port_keys() {
+    using P = drivers::CanPortSettings;
+    using A = drivers::AssemblerSettings;
+    using Kind = P::Kind;
+    const auto can = part(&C::can);
+    const auto assembler = part(&C::assembler);
+    return {
+        choice<Kind>("can.port", can(&P::kind),
+                     {{"socketcan", Kind::socketcan}, {"seqpacket", Kind::seqpacket}},
+                     "the kernel's CAN, or a Unix socket that carries CAN frames"),
+        text("can.interface", can(&P::interface), "1 to 15 characters",
+             "socketcan: network interface", interface_rule),
+        text("can.path", can(&P::path), "absolute or \"@name\"",
+             "seqpacket: Unix socket; @: abstract name", socket_or_empty_rule),
+        text("can.dbc", at(&C::dbc), "a path", "DBC file of the bus; empty: the built-in rig.dbc",
+             path_rule),
+        boolean("can.fd", can(&P::fd), "accept CAN FD frames"),
+        integer("can.receive_buffer", can(&P::receive_buffer), "byte", 4096, 1 << 30,
+                "receive buffer of the socket"),
+        converted(
+            "can.sample_rate_hz", assembler(&A::sample_period), "Hz", {1, 10'000},
+            "samples, that is sync counts, per second",
             // The period is kept in whole ns; a rate such as 30 Hz shows as it was written.
-            return std::round(1e9 / static_cast<double>(c.assembler.sample_period) * 1e4) / 1e4;
-        },
-        [](C& c, double rate) {
-            c.assembler.sample_period = static_cast<drivers::Time>(std::llround(1e9 / rate));
-        }));
-    keys.push_back(integer("can.samples_per_frame", "", 1, 16,
-                           "samples in each frame that carries a channel, as CAN FD has room for: "
-                           "signal S is of the first, S_1, S_2, ... of the next; the frame's count "
-                           "is the first one's",
-                           [](C& c) -> int& { return c.assembler.samples_per_frame; }));
-    keys.push_back(milliseconds(
-        "can.join_deadline_ms", {1, 10'000},
-        "a sample is given out this long after its first frame",
-        [](C & c) -> auto& { return c.assembler.join_deadline; }));
-    keys.push_back(milliseconds(
-        "can.stale_deadline_ms", {1, 60'000}, "a channel without a value for longer is stale",
-        [](C & c) -> auto& { return c.assembler.stale_deadline; }));
+            [](drivers::Time period) {
+                return std::round(1e9 / static_cast<double>(period) * 1e4) / 1e4;
+            },
+            [](double rate) { return static_cast<drivers::Time>(std::llround(1e9 / rate)); }),
+        integer("can.samples_per_frame", assembler(&A::samples_per_frame), "", 1, 16,
+                "samples in each frame that carries a channel, as CAN FD has room for: signal S is "
+                "of the first, S_1, S_2, ... of the next; the frame's count is the first one's"),
+        milliseconds("can.join_deadline_ms", assembler(&A::join_deadline), {1, 10'000},
+                     "a sample is given out this long after its first frame"),
+        milliseconds("can.stale_deadline_ms", assembler(&A::stale_deadline), {1, 60'000},
+                     "a channel without a value for longer is stale"),
+    };
 }
 
-void add_signal_keys(std::vector<Key>& keys) {
+std::vector<Key> signal_keys() {
     struct Row {
         const char* name;
         std::string SignalBindings::*member;
@@ -77,12 +71,11 @@ void add_signal_keys(std::vector<Key>& keys) {
         {"temperature_gyro_y", &S::temperature_gyro_y, "degC; as temperature_case"},
         {"temperature_gyro_z", &S::temperature_gyro_z, "degC; as temperature_case"},
     };
-    const auto at = [](std::string S::*member) -> At<std::string> {
-        return [member](C& c) -> std::string& { return c.assembler.bindings.*member; };
-    };
+    const auto bindings = part(&C::assembler, &drivers::AssemblerSettings::bindings);
+    std::vector<Key> keys;
     const auto add = [&](const std::string& name, std::string S::*member, const char* doc) {
-        keys.push_back(text("can.signals." + name, "\"Message.Signal\" or empty", doc, binding_rule,
-                            at(member)));
+        keys.push_back(text("can.signals." + name, bindings(member), "\"Message.Signal\" or empty",
+                            doc, binding_rule));
     };
     add("sync_count", &S::sync_count, "full counter, one count per sample");
     // What is of one kind stands together: first the values, then whether they are valid.
@@ -99,37 +92,32 @@ void add_signal_keys(std::vector<Key>& keys) {
                 add(row->name + std::string("_valid"), row->valid, row->valid_help);
     }
     for (const Row& row : kRows) add(row.name, row.member, row.doc);
-    keys.push_back(text("can.signals.message_sync_signal", "a signal name or empty",
+    keys.push_back(text("can.signals.message_sync_signal", bindings(&S::message_sync_signal),
+                        "a signal name or empty",
                         "in any message with a channel: low bits of its sync count",
-                        identifier_or_empty_rule, at(&S::message_sync_signal)));
+                        identifier_or_empty_rule));
+    return keys;
 }
 
-void add_gimbal_keys(std::vector<Key>& keys) {
-    keys.push_back(text(
-        "gimbal.message", "a message name",
-        "command with signals Outer, Inner, Azimuth, Mode, Counter", identifier_rule,
-        [](C & c) -> auto& { return c.gimbal.message; }));
-    keys.push_back(milliseconds(
-        "gimbal.status_deadline_ms", {10, 60'000}, "an older status is not believed",
-        [](C & c) -> auto& { return c.gimbal.status_deadline; }));
-    keys.push_back(seconds(
-        "gimbal.slew_timeout_s", {1, 3600}, "from command to in position",
-        [](C & c) -> auto& { return c.gimbal.slew_timeout; }));
-    keys.push_back(milliseconds(
-        "gimbal.repeat_ms", {10, 60'000}, "a command is sent again until its counter is echoed",
-        [](C & c) -> auto& { return c.gimbal.repeat; }));
-    keys.push_back(travels(
-        "gimbal.travel_deg",
-        "what cables allow, as the encoders count; a whole turn or more: no limit",
-        [](C & c) -> auto& { return c.gimbal.travel_deg; }));
+std::vector<Key> gimbal_keys() {
+    using G = drivers::GimbalSettings;
+    const auto gimbal = part(&C::gimbal);
+    return {
+        text("gimbal.message", gimbal(&G::message), "a message name",
+             "command with signals Outer, Inner, Azimuth, Mode, Counter", identifier_rule),
+        milliseconds("gimbal.status_deadline_ms", gimbal(&G::status_deadline), {10, 60'000},
+                     "an older status is not believed"),
+        seconds("gimbal.slew_timeout_s", gimbal(&G::slew_timeout), {1, 3600},
+                "from command to in position"),
+        milliseconds("gimbal.repeat_ms", gimbal(&G::repeat), {10, 60'000},
+                     "a command is sent again until its counter is echoed"),
+        travels("gimbal.travel_deg", gimbal(&G::travel_deg),
+                "what cables allow, as the encoders count; a whole turn or more: no limit"),
+    };
 }
 
 }  // namespace
 
-void add_bus_keys(std::vector<Key>& keys) {
-    add_port_keys(keys);
-    add_signal_keys(keys);
-    add_gimbal_keys(keys);
-}
+std::vector<Key> bus_keys() { return joined({port_keys(), signal_keys(), gimbal_keys()}); }
 
 }  // namespace vibrig::configuration

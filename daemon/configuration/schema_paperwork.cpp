@@ -1,4 +1,5 @@
-#include <set>
+#include <array>
+#include <cstdio>
 
 #include "daemon/configuration/key.hpp"
 #include "daemon/configuration/rules.hpp"
@@ -7,6 +8,8 @@
 namespace vibrig::configuration {
 
 namespace {
+
+using C = Configuration;
 
 constexpr std::size_t kMostInstruments = 50;
 // A date has no type of its own in JSON.
@@ -22,16 +25,12 @@ std::string date_text(const toml::date& date) {
     return text.data();
 }
 
-bool read_instrument(const toml::table& table, const std::string& key, record::Instrument& to,
-                     Problems& problems) {
-    bool good = true;
-    const auto refuse = [&](const toml::node& node, const std::string& part,
-                            const std::string& found, const std::string& expected) {
-        problems.add(place_of(node.source()), key + "." + part, found, expected);
-        good = false;
-    };
+void read_instrument(const Entry& entry, const toml::table& table, C& c) {
+    record::Instrument to;
+    const std::size_t problems = entry.problems.count();
     for (const auto& [name, node] : table) {
         const std::string part(name.str());
+        const Entry of = entry.part(node, part);
         std::string* text = part == "name"          ? &to.name
                             : part == "serial"      ? &to.serial
                             : part == "certificate" ? &to.certificate
@@ -41,67 +40,54 @@ bool read_instrument(const toml::table& table, const std::string& key, record::I
             if (const auto* date = node.as_date()) {
                 to.due = date_text(date->get());
             } else {
-                refuse(node, part, describe(node), "a date such as 2027-03-31");
+                of.refuse("a date such as 2027-03-31");
             }
         } else if (text == nullptr) {
-            refuse(node, part, "an unknown key", "name, serial, certificate, uncertainty or due");
+            of.refuse("an unknown key", "name, serial, certificate, uncertainty or due");
         } else if (const auto* value = node.as_string(); value == nullptr) {
-            refuse(node, part, describe(node), "a string");
+            of.refuse("a string");
         } else if (const auto wrong = short_text_rule(value->get()); !wrong.empty()) {
-            refuse(node, part, describe(node), wrong);
+            of.refuse(wrong);
         } else {
             *text = value->get();
         }
     }
-    if (to.name.empty() && good) refuse(table, "name", "nothing", "what the instrument is");
-    return good;
+    if (entry.problems.count() > problems) return;
+    if (to.name.empty())
+        return entry.part(table, "name").refuse("nothing", "what the instrument is");
+    c.paperwork.instruments.push_back(std::move(to));
 }
 
-void read_instruments(const toml::node& node, Configuration& c, Problems& problems) {
-    const auto* rows = node.as_array();
-    if (rows == nullptr || rows->size() > kMostInstruments) {
-        problems.add(place_of(node.source()), "instrument", describe(node),
-                     "[[instrument]] tables, at most 50");
-        return;
-    }
+void read_instruments(const Entry& entry, C& c) {
     c.paperwork.instruments.clear();
-    for (std::size_t i = 0; i < rows->size(); ++i) {
-        const std::string key = "instrument[" + std::to_string(i) + "]";
-        const auto* table = rows->get(i)->as_table();
-        record::Instrument instrument;
-        if (table == nullptr) {
-            problems.add(place_of(rows->get(i)->source()), key, describe(*rows->get(i)), "a table");
-        } else if (read_instrument(*table, key, instrument, problems)) {
-            c.paperwork.instruments.push_back(std::move(instrument));
-        }
-    }
+    entry.tables(
+        "[[instrument]] tables, at most 50",
+        [&c](const Entry& row, const toml::table& table) { read_instrument(row, table, c); },
+        kMostInstruments);
 }
 
-std::string write_instruments(Configuration& c) {
-    std::string text;
-    for (const auto& i : c.paperwork.instruments) {
-        text += (text.empty() ? "" : ", ") + std::string("{ name = ") + write_text(i.name) +
-                ", serial = " + write_text(i.serial) +
-                ", certificate = " + write_text(i.certificate) +
-                (i.uncertainty.empty() ? "" : ", uncertainty = " + write_text(i.uncertainty)) +
-                (i.due.empty() ? "" : ", due = " + i.due) + " }";
-    }
-    return "[" + text + "]";
+std::string write_instruments(C& c) {
+    return write_list(c.paperwork.instruments, [](const record::Instrument& i) {
+        return "{ name = " + write_text(i.name) + ", serial = " + write_text(i.serial) +
+               ", certificate = " + write_text(i.certificate) +
+               (i.uncertainty.empty() ? "" : ", uncertainty = " + write_text(i.uncertainty)) +
+               (i.due.empty() ? "" : ", due = " + i.due) + " }";
+    });
 }
 
 }  // namespace
 
-void add_paperwork_keys(std::vector<Key>& keys) {
-    keys.push_back(text(
-        "unit.type", "at most 120 bytes", "unit under test, for the report", short_text_rule,
-        [](Configuration & c) -> auto& { return c.paperwork.unit_type; }));
-    keys.push_back(text(
-        "unit.serial", "at most 120 bytes", "its serial number", short_text_rule,
-        [](Configuration & c) -> auto& { return c.paperwork.unit_serial; }));
-    keys.push_back({"instrument", "tables", "",
-                    "rows: name, serial, certificate, uncertainty, due (a date)",
-                    "what it is measured with, for the report; an overdue one warns before arming",
-                    read_instruments, write_instruments, kInstrumentSchema});
+std::vector<Key> paperwork_keys() {
+    const auto paperwork = part(&C::paperwork);
+    return {
+        text("unit.type", paperwork(&record::Paperwork::unit_type), "at most 120 bytes",
+             "unit under test, for the report", short_text_rule),
+        text("unit.serial", paperwork(&record::Paperwork::unit_serial), "at most 120 bytes",
+             "its serial number", short_text_rule),
+        {"instrument", "tables", "", "rows: name, serial, certificate, uncertainty, due (a date)",
+         "what it is measured with, for the report; an overdue one warns before arming",
+         read_instruments, write_instruments, kInstrumentSchema},
+    };
 }
 
 }  // namespace vibrig::configuration

@@ -46,8 +46,7 @@ std::string write_number(double value) {
 }
 
 std::string write_triple(const std::array<double, 3>& value) {
-    return "[" + write_number(value[0]) + ", " + write_number(value[1]) + ", " +
-           write_number(value[2]) + "]";
+    return write_list(value, write_number);
 }
 
 std::string write_text(const std::string& value) {
@@ -85,8 +84,19 @@ std::string expected_number(Range range, const std::string& unit) {
            (unit.empty() ? "" : " " + unit);
 }
 
-std::optional<double> read_number(const toml::node& node, const std::string& key, Range range,
-                                  const std::string& unit, Problems& problems) {
+void Entry::refuse(const std::string& found, const std::string& expected) const {
+    problems.add(place_of(node.source()), key, found, expected);
+}
+
+Entry Entry::part(const toml::node& inner, const std::string& name) const {
+    return {inner, key + "." + name, problems};
+}
+
+Entry Entry::element(std::size_t i) const {
+    return {*node.as_array()->get(i), key + "[" + std::to_string(i) + "]", problems};
+}
+
+std::optional<double> Entry::number(Range range, const std::string& unit) const {
     double value = std::nan("");
     if (const auto* floating = node.as_floating_point()) {
         value = floating->get();
@@ -95,41 +105,36 @@ std::optional<double> read_number(const toml::node& node, const std::string& key
     }
     // Written so that NaN fails.
     if (!(value >= range.low && value <= range.high)) {
-        problems.add(place_of(node.source()), key, describe(node), expected_number(range, unit));
+        refuse(expected_number(range, unit));
         return std::nullopt;
     }
     return value;
 }
 
-const toml::array* read_array(const toml::node& node, const std::string& key, std::size_t low,
-                              std::size_t high, const std::string& elements, Problems& problems) {
-    const toml::array* array = node.as_array();
-    if (array == nullptr || array->size() < low || array->size() > high) {
-        const std::string count =
-            low == high ? std::to_string(low) : std::to_string(low) + " to " + std::to_string(high);
-        problems.add(place_of(node.source()), key, describe(node),
-                     "an array of " + count + " " + elements);
-        return nullptr;
-    }
-    return array;
+std::optional<std::array<double, 3>> Entry::triple(const std::array<Range, 3>& ranges,
+                                                   const std::string& unit) const {
+    auto range = ranges.begin();
+    const auto value =
+        elements(3, 3, "numbers", [&](const Entry& one) { return one.number(*range++, unit); });
+    if (!value) return std::nullopt;
+    return std::array{(*value)[0], (*value)[1], (*value)[2]};
 }
 
-std::optional<std::array<double, 3>> read_triple(const toml::node& node, const std::string& key,
-                                                 const std::array<Range, 3>& ranges,
-                                                 const std::string& unit, Problems& problems) {
-    const toml::array* array = read_array(node, key, 3, 3, "numbers", problems);
-    if (array == nullptr) {
-        return std::nullopt;
-    }
-    std::array<double, 3> value{};
-    bool good = true;
-    for (std::size_t i = 0; i < 3; ++i) {
-        const auto element = read_number(*array->get(i), key + "[" + std::to_string(i) + "]",
-                                         ranges[i], unit, problems);
-        good = good && element.has_value();
-        value[i] = element.value_or(0);
-    }
-    return good ? std::optional(value) : std::nullopt;
+std::optional<std::string> Entry::text(const std::string& kind, const TextRule& rule) const {
+    const auto* value = node.as_string();
+    const std::string expected = value == nullptr ? kind : rule(value->get());
+    if (expected.empty()) return value->get();
+    refuse(value == nullptr ? describe(node) : "\"" + printable(value->get()) + "\"", expected);
+    return std::nullopt;
+}
+
+const toml::array* Entry::array(std::size_t low, std::size_t high, const std::string& what) const {
+    const toml::array* array = node.as_array();
+    if (array != nullptr && array->size() >= low && array->size() <= high) return array;
+    const std::string count =
+        low == high ? std::to_string(low) : std::to_string(low) + " to " + std::to_string(high);
+    refuse("an array of " + count + " " + what);
+    return nullptr;
 }
 
 std::string schema_of(Range range) {
