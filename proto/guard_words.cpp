@@ -1,7 +1,10 @@
 #include "proto/guard_words.hpp"
 
+#include <array>
 #include <bit>
 #include <cmath>
+
+#include "proto/word_of.hpp"
 
 namespace vibrig::proto {
 
@@ -48,39 +51,20 @@ class WordReader {
 }  // namespace
 
 const char* name_of(GuardCause cause) noexcept {
-    switch (cause) {
-        case GuardCause::none:
-            return "none";
-        case GuardCause::daemon_silent:
-            return "daemon_silent";
-        case GuardCause::daemon_hangs:
-            return "daemon_hangs";
-        case GuardCause::unarmed_motion:
-            return "unarmed_motion";
-        case GuardCause::over_level:
-            return "over_level";
-        case GuardCause::stop_disobeyed:
-            return "stop_disobeyed";
-    }
-    return "?";
+    static constexpr std::array kWords{"none",           "daemon_silent", "daemon_hangs",
+                                       "unarmed_motion", "over_level",    "stop_disobeyed"};
+    return word_of(kWords, cause);
 }
 
 const char* text_of(GuardCause cause) noexcept {
-    switch (cause) {
-        case GuardCause::none:
-            return "nothing found";
-        case GuardCause::daemon_silent:
-            return "vibrigd is silent while the table moves";
-        case GuardCause::daemon_hangs:
-            return "a stage of vibrigd hangs while the table moves";
-        case GuardCause::unarmed_motion:
-            return "the table moves and nobody has armed it";
-        case GuardCause::over_level:
-            return "the table moves by more than what was armed";
-        case GuardCause::stop_disobeyed:
-            return "a stop was ordered and the table is not at rest: press the emergency stop";
-    }
-    return "?";
+    static constexpr std::array kWords{
+        "nothing found",
+        "vibrigd is silent while the table moves",
+        "a stage of vibrigd hangs while the table moves",
+        "the table moves and nobody has armed it",
+        "the table moves by more than what was armed",
+        "a stop was ordered and the table is not at rest: press the emergency stop"};
+    return word_of(kWords, cause);
 }
 
 std::array<std::uint8_t, kDaemonWordBytes> encode(const DaemonWord& word) noexcept {

@@ -39,17 +39,8 @@ bool encode_bits(const Register& reg, double value, std::span<std::uint16_t> wor
 }  // namespace
 
 std::size_t Register::words() const noexcept {
-    switch (type) {
-        case RegisterType::u32:
-        case RegisterType::i32:
-        case RegisterType::f32:
-            return 2;
-        case RegisterType::u16:
-        case RegisterType::i16:
-        case RegisterType::bits:
-            break;
-    }
-    return 1;
+    using enum RegisterType;
+    return type == u32 || type == i32 || type == f32 ? 2 : 1;
 }
 
 double decode(const Register& reg, std::span<const std::uint16_t> words) noexcept {

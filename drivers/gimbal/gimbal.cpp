@@ -1,31 +1,21 @@
 #include "drivers/gimbal/gimbal.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <string>
 
 #include "drivers/sample/assembler.hpp"
 #include "drivers/sample/signal_binding.hpp"
+#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 
 const char* name_of(GimbalState state) noexcept {
-    switch (state) {
-        case GimbalState::idle:
-            return "idle";
-        case GimbalState::commanding:
-            return "commanding";
-        case GimbalState::slewing:
-            return "slewing";
-        case GimbalState::in_position:
-            return "in_position";
-        case GimbalState::timed_out:
-            return "timed_out";
-        case GimbalState::no_status:
-            return "no_status";
-    }
-    return "?";
+    static constexpr std::array kWords{"idle",        "commanding", "slewing",
+                                       "in_position", "timed_out",  "no_status"};
+    return proto::word_of(kWords, state);
 }
 
 Gimbal::Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port)

@@ -1,6 +1,9 @@
 #include "drivers/sample/sample.hpp"
 
+#include <array>
+
 #include "drivers/sample/channels.hpp"
+#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 
@@ -10,21 +13,9 @@ const char* name_of(Channel channel) noexcept {
 }
 
 const char* name_of(Quality quality) noexcept {
-    switch (quality) {
-        case Quality::good:
-            return "good";
-        case Quality::missing:
-            return "missing";
-        case Quality::stale:
-            return "stale";
-        case Quality::flagged:
-            return "flagged";
-        case Quality::out_of_range:
-            return "out_of_range";
-        case Quality::unbound:
-            return "unbound";
-    }
-    return "?";
+    static constexpr std::array kWords{"good",    "missing",      "stale",
+                                       "flagged", "out_of_range", "unbound"};
+    return proto::word_of(kWords, quality);
 }
 
 }  // namespace vibrig::drivers

@@ -1,7 +1,10 @@
 #include "drivers/shaker/shaker.hpp"
 
+#include <array>
+
 #include "drivers/shaker/modbus_shaker.hpp"
 #include "drivers/shaker/shaker_image.hpp"
+#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 namespace {
@@ -22,19 +25,8 @@ void check_range(const char* key, int value, int least, int most) {
 }  // namespace
 
 const char* name_of(LinkState state) noexcept {
-    switch (state) {
-        case LinkState::absent:
-            return "absent";
-        case LinkState::connecting:
-            return "connecting";
-        case LinkState::running:
-            return "running";
-        case LinkState::degraded:
-            return "degraded";
-        case LinkState::fault:
-            return "fault";
-    }
-    return "?";
+    static constexpr std::array kWords{"absent", "connecting", "running", "degraded", "fault"};
+    return proto::word_of(kWords, state);
 }
 
 std::unique_ptr<Shaker> make_shaker(Clock& clock, const ShakerSettings& settings) {
