@@ -11,7 +11,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <thread>
 #include <utility>
 
 #include "drivers/can/can_pending_operations.hpp"
@@ -349,36 +348,8 @@ bool CanPortBase::send(const canfd_frame& frame, bool fd) noexcept {
     return sent;
 }
 
-void CanPortBase::publish() noexcept {
-    const std::array<std::uint64_t, 7> values{
-        counted_.received,  counted_.delivered,      counted_.own,        counted_.error_frames,
-        counted_.malformed, counted_.kernel_dropped, counted_.transitions};
-    const std::uint32_t version = version_.load(std::memory_order_relaxed);
-    version_.store(version + 1, std::memory_order_relaxed);
-    // Release: none of these becomes visible before the odd version; acquire in counters() pairs
-    // with it.
-    for (std::size_t i = 0; i < values.size(); ++i)
-        published_[i].store(values[i], std::memory_order_release);
-    version_.store(version + 2, std::memory_order_release);
-}
-
 CanPortCounters CanPortBase::counters() const noexcept {
-    std::array<std::uint64_t, 7> values{};
-    for (;;) {
-        const std::uint32_t before = version_.load(std::memory_order_acquire);
-        for (std::size_t i = 0; i < values.size(); ++i)
-            values[i] = published_[i].load(std::memory_order_acquire);
-        if (before % 2 == 0 && version_.load(std::memory_order_relaxed) == before) break;
-        std::this_thread::yield();  // a system call: a writer of lower priority gets to finish
-    }
-    CanPortCounters c;
-    c.received = values[0];
-    c.delivered = values[1];
-    c.own = values[2];
-    c.error_frames = values[3];
-    c.malformed = values[4];
-    c.kernel_dropped = values[5];
-    c.transitions = values[6];
+    CanPortCounters c = published_.read();
     c.sent = sent_.load(std::memory_order_relaxed);
     c.send_failed = send_failed_.load(std::memory_order_relaxed);
     c.controller = controller_.load(std::memory_order_relaxed);

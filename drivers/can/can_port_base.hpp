@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "drivers/base/snapshot.hpp"
 #include "drivers/can/can_port.hpp"
 #include "drivers/can/receive_batch.hpp"
 
@@ -75,7 +76,7 @@ class CanPortBase : public CanPort {
     void watch_controller(const canfd_frame& error_frame);
     void lost(int error);
     void enter(PortState state, int error, const char* text);
-    void publish() noexcept;
+    void publish() noexcept { published_.publish(counted_); }
 
     const CanPortSettings settings_;
     const std::string place_;
@@ -99,11 +100,10 @@ class CanPortBase : public CanPort {
     std::array<ReceivedFrame, ReceiveBatch::kCapacity> frames_{};
     std::array<ReceivedFrame, ReceiveBatch::kCapacity> errors_{};
 
-    // The receive side counts in `counted_` and publishes after each batch; `version_` is odd while
-    // it does, so that a reader in another thread gets counters that belong together.
+    // The receive side counts in `counted_` and publishes after each batch, so that a reader in
+    // another thread gets counters that belong together.
     CanPortCounters counted_;
-    std::atomic<std::uint32_t> version_{0};
-    std::array<std::atomic<std::uint64_t>, 7> published_{};
+    rt::Snapshot<CanPortCounters> published_;
     std::atomic<std::uint64_t> sent_{0};
     std::atomic<std::uint64_t> send_failed_{0};
     std::atomic<ControllerState> controller_{ControllerState::active};
