@@ -51,26 +51,7 @@ std::vector<Key> port_keys() {
 }
 
 std::vector<Key> signal_keys() {
-    struct Row {
-        const char* name;
-        std::string SignalBindings::*member;
-        const char* doc;
-    };
     using S = SignalBindings;
-    static constexpr Row kRows[] = {
-        {"loop_closed", &S::loop_closed, "1: stabilisation loop closed"},
-        {"gyros_at_speed", &S::gyros_at_speed, "1: gyro wheels at speed"},
-        {"ready", &S::ready, "1: platform ready"},
-        {"fault", &S::fault, "1: platform fault"},
-        {"temperature", &S::temperature, "platform temperature, degC"},
-        {"in_position", &S::in_position, "1: gimbals in position"},
-        {"slewing", &S::slewing, "1: gimbals slewing"},
-        {"command_echo", &S::command_echo, "counter of the last gimbal command accepted"},
-        {"temperature_case", &S::temperature_case, "degC; the default may be missing in the DBC"},
-        {"temperature_gyro_x", &S::temperature_gyro_x, "degC; as temperature_case"},
-        {"temperature_gyro_y", &S::temperature_gyro_y, "degC; as temperature_case"},
-        {"temperature_gyro_z", &S::temperature_gyro_z, "degC; as temperature_case"},
-    };
     const auto bindings = part(&C::assembler, &drivers::AssemblerSettings::bindings);
     std::vector<Key> keys;
     const auto add = [&](const std::string& name, std::string S::*member, const char* doc) {
@@ -91,7 +72,7 @@ std::vector<Key> signal_keys() {
             if (row->valid != nullptr)
                 add(row->name + std::string("_valid"), row->valid, row->valid_help);
     }
-    for (const Row& row : kRows) add(row.name, row.member, row.doc);
+    for (const drivers::StatusRow& row : drivers::kStatusTable) add(row.name, row.signal, row.help);
     keys.push_back(text("can.signals.message_sync_signal", bindings(&S::message_sync_signal),
                         "a signal name or empty",
                         "in any message with a channel: low bits of its sync count",

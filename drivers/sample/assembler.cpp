@@ -374,46 +374,20 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
         if (!proto::present(*message.message, *s.signal, payload)) continue;
         const std::optional<double> value = proto::decode(*s.signal, payload);
         if (!value || !std::isfinite(*value) || proto::out_of_range(*s.signal, *value)) continue;
-        using Field = MessagePlan::StatusField;
-        const bool set = *value != 0;
-        if (s.field >= Field::temperature_case) {
-            const auto sensor = static_cast<std::size_t>(s.field) -
-                                static_cast<std::size_t>(Field::temperature_case);
-            platform.sensor_c[sensor] = *value;
-            platform.sensor_time[sensor] = frame.time;
+        const StatusRow& row = *s.row;
+        if (row.sensor) {
+            platform.sensor_c[*row.sensor] = *value;
+            platform.sensor_time[*row.sensor] = frame.time;
             continue;
         }
-        const bool gimbal = s.field == Field::in_position || s.field == Field::slewing ||
-                            s.field == Field::command_echo;
-        (gimbal ? platform.gimbal_time : platform.time) = frame.time;
-        switch (s.field) {
-            case Field::loop_closed:
-                platform.loop_closed = set;
-                break;
-            case Field::gyros_at_speed:
-                platform.gyros_at_speed = set;
-                break;
-            case Field::ready:
-                platform.ready = set;
-                break;
-            case Field::fault:
-                platform.fault = set;
-                break;
-            case Field::temperature:
-                platform.temperature_c = *value;
-                break;
-            case Field::in_position:
-                platform.in_position = set;
-                break;
-            case Field::slewing:
-                platform.slewing = set;
-                break;
-            case Field::command_echo:
-                platform.gimbal_command_echo =
-                    static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
-                break;
-            default:  // temperatures, above
-                break;
+        (row.of_gimbals ? platform.gimbal_time : platform.time) = frame.time;
+        if (row.flag != nullptr) {
+            platform.*row.flag = *value != 0;
+        } else if (row.of_gimbals) {
+            platform.gimbal_command_echo =
+                static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
+        } else {
+            platform.temperature_c = *value;
         }
     }
 }

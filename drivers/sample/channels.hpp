@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "drivers/sample/assembler.hpp"
@@ -61,5 +63,38 @@ static_assert([] {
         if (static_cast<std::size_t>(kChannelTable[i].channel) != i) return false;
     return true;
 }());
+
+/// What the platform and the gimbals say of themselves: key can.signals.NAME.
+struct StatusRow {
+    const char* name;
+    std::string SignalBindings::*signal;
+    const char* help;
+    bool PlatformStatus::*flag = nullptr;  ///< that is set unless the value is 0
+    bool of_gimbals = false;
+    std::optional<std::size_t> sensor = {};  ///< place in kTemperatureSensors
+};
+
+inline constexpr std::array kStatusTable{
+    StatusRow{"loop_closed", &SignalBindings::loop_closed, "1: stabilisation loop closed",
+              &PlatformStatus::loop_closed},
+    StatusRow{"gyros_at_speed", &SignalBindings::gyros_at_speed, "1: gyro wheels at speed",
+              &PlatformStatus::gyros_at_speed},
+    StatusRow{"ready", &SignalBindings::ready, "1: platform ready", &PlatformStatus::ready},
+    StatusRow{"fault", &SignalBindings::fault, "1: platform fault", &PlatformStatus::fault},
+    StatusRow{"temperature", &SignalBindings::temperature, "platform temperature, degC"},
+    StatusRow{"in_position", &SignalBindings::in_position, "1: gimbals in position",
+              &PlatformStatus::in_position, true},
+    StatusRow{"slewing", &SignalBindings::slewing, "1: gimbals slewing", &PlatformStatus::slewing,
+              true},
+    StatusRow{"command_echo", &SignalBindings::command_echo,
+              "counter of the last gimbal command accepted", nullptr, true},
+    StatusRow{"temperature_case", &SignalBindings::temperature_case,
+              "degC; the default may be missing in the DBC", nullptr, false, 0},
+    StatusRow{"temperature_gyro_x", &SignalBindings::temperature_gyro_x,
+              "degC; as temperature_case", nullptr, false, 1},
+    StatusRow{"temperature_gyro_y", &SignalBindings::temperature_gyro_y,
+              "degC; as temperature_case", nullptr, false, 2},
+    StatusRow{"temperature_gyro_z", &SignalBindings::temperature_gyro_z,
+              "degC; as temperature_case", nullptr, false, 3}};
 
 }  // namespace vibrig::drivers

@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/sample/channels.hpp"
 #include "drivers/sample/signal_binding.hpp"
 
 namespace vibrig::drivers {
@@ -69,12 +68,6 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
                            "at least one measured channel, such as outer = \"Resolvers.Outer\"");
     }
 
-    using Field = MessagePlan::StatusField;
-    struct StatusName {
-        Field field;
-        const char* key;
-        const std::string& name;
-    };
     const SignalBindings usual;
     // Few rigs have more than one temperature: what nobody asked for need not be there.
     const auto if_there = [&](const std::string& name, const std::string& as_usual) {
@@ -84,29 +77,11 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
                            message->find(std::string_view(name).substr(dot + 1)) != nullptr;
         return name == as_usual && !there ? none : name;
     };
-    const std::array<std::string, 4> sensors{
-        if_there(names.temperature_case, usual.temperature_case),
-        if_there(names.temperature_gyro_x, usual.temperature_gyro_x),
-        if_there(names.temperature_gyro_y, usual.temperature_gyro_y),
-        if_there(names.temperature_gyro_z, usual.temperature_gyro_z)};
-    const std::array<StatusName, 12> status{{
-        {Field::loop_closed, "loop_closed", names.loop_closed},
-        {Field::gyros_at_speed, "gyros_at_speed", names.gyros_at_speed},
-        {Field::ready, "ready", names.ready},
-        {Field::fault, "fault", names.fault},
-        {Field::temperature, "temperature", names.temperature},
-        {Field::in_position, "in_position", names.in_position},
-        {Field::slewing, "slewing", names.slewing},
-        {Field::command_echo, "command_echo", names.command_echo},
-        {Field::temperature_case, "temperature_case", sensors[0]},
-        {Field::temperature_gyro_x, "temperature_gyro_x", sensors[1]},
-        {Field::temperature_gyro_y, "temperature_gyro_y", sensors[2]},
-        {Field::temperature_gyro_z, "temperature_gyro_z", sensors[3]},
-    }};
-    for (const StatusName& s : status) {
-        if (const BoundSignal bound = bind(s.key, s.name)) {
-            plan_for(*bound.message).status.push_back({s.field, bound.signal});
-        }
+    for (const StatusRow& row : kStatusTable) {
+        const std::string& name = names.*row.signal;
+        if (const BoundSignal bound =
+                bind(row.name, row.sensor ? if_there(name, usual.*row.signal) : name))
+            plan_for(*bound.message).status.push_back({&row, bound.signal});
     }
 
     if (!missing.empty()) throw BindingError(std::move(missing));

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/sample/assembler.hpp"
+#include "drivers/sample/channels.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::drivers {
@@ -24,22 +24,8 @@ struct MessagePlan {
         std::uint32_t first = 0, last = 0;
         std::uint64_t bit = 0;
     };
-    enum class StatusField : std::uint8_t {
-        loop_closed,
-        gyros_at_speed,
-        ready,
-        fault,
-        temperature,
-        in_position,
-        slewing,
-        command_echo,
-        temperature_case,  ///< and the others of kTemperatureSensors, in their order
-        temperature_gyro_x,
-        temperature_gyro_y,
-        temperature_gyro_z
-    };
     struct StatusSignal {
-        StatusField field;
+        const StatusRow* row;
         const proto::Signal* signal;
     };
 
