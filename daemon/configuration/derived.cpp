@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -158,6 +159,14 @@ void take_controller_psd(Configuration& c, const std::filesystem::path& folder,
     }
 }
 
+/// What the encoder of a gimbal shows of it, within the travel where there is one; none: the travel
+/// does not reach it.
+std::optional<double> reading_of(const Configuration& c, std::size_t gimbal, double reading) {
+    const auto& travel = c.gimbal.travel_deg[gimbal];
+    const bool free = travel[1] - travel[0] >= 360;
+    return drivers::within_travel(reading, free ? std::array{-180.0, 180.0} : travel);
+}
+
 /// From gimbal angles, which files state, to what the encoders show, within the travel where there
 /// is one that reaches it.
 void to_readings(Configuration& c) {
@@ -169,8 +178,7 @@ void to_readings(Configuration& c) {
             const bool free = travel[1] - travel[0] >= 360;
             if (free && sign == 1 && zero == 0) continue;
             const double reading = sign * position[i] + zero;
-            position[i] = drivers::within_travel(reading, free ? std::array{-180.0, 180.0} : travel)
-                              .value_or(reading);
+            position[i] = reading_of(c, i, reading).value_or(reading);
         }
     };
     for (auto& position : c.campaign.positions_deg) convert(position);
@@ -183,9 +191,7 @@ void take_the_ways_of_zeroing(Configuration& c, bool second_axis_stated) {
     if (!c.campaign.zeroing || c.estimator.up.axis == 0) return;  // refused elsewhere
     const auto within = [&c](const std::array<double, 3>& angles, std::size_t gimbals) {
         for (std::size_t i = 0; i < gimbals; ++i) {
-            const auto& travel = c.gimbal.travel_deg[i];
-            if (travel[1] - travel[0] < 360 && !drivers::within_travel(angles[i], travel))
-                return false;
+            if (!reading_of(c, i, angles[i])) return false;
         }
         return true;
     };
@@ -206,10 +212,7 @@ std::vector<campaign::OpeningStop> opening_stops(const Configuration& c) {
                             std::vector<campaign::OpeningStop>& into) {
         angle = estimator::encoder_deg(c.estimator, angle);
         for (std::size_t i = 0; i < 3; ++i) {
-            const auto& travel = c.gimbal.travel_deg[i];
-            const bool free = travel[1] - travel[0] >= 360;
-            const auto reading =
-                drivers::within_travel(angle[i], free ? std::array{-180.0, 180.0} : travel);
+            const auto reading = reading_of(c, i, angle[i]);
             if (!reading) return false;
             angle[i] = *reading;
         }
