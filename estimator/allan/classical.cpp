@@ -56,11 +56,6 @@ double classical_variance(std::span<const Oscillation> oscillations, double q, d
     return sum;
 }
 
-double allan_variance(std::span<const Oscillation> oscillations, double q, double tau) {
-    return 2 * (classical_variance(oscillations, q, tau) -
-                classical_variance(oscillations, q, 2 * tau));
-}
-
 double allan_multiplier(int power) { return 2 * (1 - std::pow(2.0, power)); }
 
 ClassSums class_sums(const Polynomial& a, double tau) {

@@ -19,9 +19,6 @@ struct Oscillation {
 /// Variance of the tau-average about the true mean, exact, with quantisation Q (arcsec).
 [[nodiscard]] double classical_variance(std::span<const Oscillation> oscillations, double q,
                                         double tau);
-/// Stationary processes: AVAR(tau) = 2 (classical(tau) - classical(2 tau)).
-[[nodiscard]] double allan_variance(std::span<const Oscillation> oscillations, double q,
-                                    double tau);
 
 /// sigma_c^2 = a0 + a1 tau + a2 tau^2 + a3 / tau + a4 / tau^2: slow class a0 a1 a2, fast a3 a4.
 using Polynomial = std::array<double, 5>;

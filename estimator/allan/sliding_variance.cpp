@@ -14,10 +14,6 @@ namespace {
 
 constexpr double kLargestRelativeError = 1e-9;
 
-}  // namespace
-
-namespace {
-
 constexpr double kFalls = 3;  // e-folds of the exponential window
 
 /// `at`: 0 oldest, 1 newest.
@@ -130,7 +126,6 @@ void SlidingVariance::recompute() noexcept {
             if (pass == 0) {
                 const double scale = std::max(exact.second, 1e-300);
                 const double error = std::abs(sums_[k].second - exact.second) / scale;
-                largest_error_ = std::max(largest_error_, error);
                 faults_ += error > kLargestRelativeError ? 1 : 0;
             }
             sums_[k] = exact;

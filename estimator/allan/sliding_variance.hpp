@@ -49,7 +49,6 @@ class SlidingVariance {
 
     /// Once per window the sums are computed anew: how often they were off by more than 1e-9.
     [[nodiscard]] std::uint64_t faults() const noexcept { return faults_; }
-    [[nodiscard]] double largest_error() const noexcept { return largest_error_; }
 
   private:
     struct Sums {
@@ -77,7 +76,6 @@ class SlidingVariance {
     std::uint64_t newest_ = 0;  ///< index of the newest angle
     std::size_t missing_ = 0;
     std::uint64_t faults_ = 0;
-    double largest_error_ = 0;
 };
 
 }  // namespace vibrig::estimator::allan

@@ -15,7 +15,6 @@ class UdFilter {
     static constexpr std::size_t kAngles = kUdAngles;
     static constexpr std::size_t kConstants = kUdConstants;
     static constexpr std::size_t kStates = kAngles + kConstants;
-    static constexpr std::size_t kPadded = kUdPadded;
 
     using Vector3 = std::array<double, 3>;
     using Matrix3 = std::array<std::array<double, 3>, 3>;

@@ -45,11 +45,6 @@ double SlewPlan::azimuth_deg(double time_s) const noexcept {
     return leg.from + part * (leg.to - leg.from);
 }
 
-double SlewPlan::rate_at(double time_s) const noexcept {
-    const Leg leg = leg_at(*this, std::max(0.0, time_s));
-    return leg.to == leg.from ? 0 : std::copysign(rate_deg_s, leg.to - leg.from);
-}
-
 double SlewPlan::sweep_s() const noexcept {
     const std::size_t n = targets_deg.size();
     const double back = n < 2 ? 0 : 2 * std::abs(targets_deg[n - 1] - targets_deg[n - 2]);

@@ -29,7 +29,6 @@ struct SlewPlan {
 
     [[nodiscard]] bool turns() const noexcept;
     [[nodiscard]] double azimuth_deg(double time_s) const noexcept;
-    [[nodiscard]] double rate_at(double time_s) const noexcept;  ///< deg/s, signed
     /// There and back between the last two targets, s; the whole duration where nothing turns.
     [[nodiscard]] double sweep_s() const noexcept;
     /// Azimuths at which the platform turns round or ends, each once.

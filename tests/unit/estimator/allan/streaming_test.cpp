@@ -94,7 +94,6 @@ TEST(SlidingVariance, CountsAFaultWhenARunningSumHasLostItsDigits) {
     }
     // THEN the exact recomputation finds the error, counts it and repairs the sum
     EXPECT_GT(sliding.faults(), 0U);
-    EXPECT_GT(sliding.largest_error(), 1e-9);
     double expected = 0;
     for (std::size_t i = 256 - 64; i + 1 < 256; ++i) {
         expected += std::pow(rate[i + 1] - rate[i], 2) / (2 * 63.0);
