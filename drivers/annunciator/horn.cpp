@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <array>
-
-#include "proto/word_of.hpp"
+#include <cstddef>
 
 namespace vibrig::drivers {
 
@@ -26,7 +25,8 @@ ShakerSettings link_settings(const HornSettings& settings) {
 
 const char* name_of(HornPattern pattern) noexcept {
     static constexpr std::array kWords{"none", "alarm", "abort", "disobeyed"};
-    return proto::word_of(kWords, pattern);
+    const auto index = static_cast<std::size_t>(pattern);
+    return index < kWords.size() ? kWords[index] : "?";
 }
 
 bool horn_sounds(HornPattern pattern, Time since) noexcept {

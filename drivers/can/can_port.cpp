@@ -1,20 +1,22 @@
 #include "drivers/can/can_port.hpp"
 
 #include <array>
+#include <cstddef>
 
 #include "drivers/can/can_port_base.hpp"
-#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 
 const char* name_of(ControllerState state) noexcept {
     static constexpr std::array kWords{"active", "warning", "passive", "bus off"};
-    return proto::word_of(kWords, state, "unknown");
+    const auto index = static_cast<std::size_t>(state);
+    return index < kWords.size() ? kWords[index] : "unknown";
 }
 
 const char* name_of(PortState state) noexcept {
     static constexpr std::array kWords{"absent", "connecting", "running", "degraded", "fault"};
-    return proto::word_of(kWords, state);
+    const auto index = static_cast<std::size_t>(state);
+    return index < kWords.size() ? kWords[index] : "?";
 }
 
 std::unique_ptr<CanPort> make_can_port(boost::asio::io_context& io,
