@@ -126,11 +126,11 @@ class Table {
 
   private:
     struct Column {
-        ColumnSpec spec;
-        std::string name;       ///< in the file
         std::size_t bytes = 0;  ///< of one row
-        Handle dataset, type;
         std::vector<unsigned char> buffer;
+        ColumnSpec spec;
+        std::string name;  ///< in the file
+        Handle dataset, type;
     };
     /// With no dataset yet.
     Column& add(ColumnSpec spec);

@@ -40,12 +40,12 @@ void add_rows(Page& page, const json& newest) {
 /// Stop times over the days: a contactor that wears shows.
 void add_trend(Page& page, const json& proof) {
     const json& history = proof.at("history");
-    Chart chart{.title = "Stop times of the proofs",
-                .x = Axis("days before the newest proof", false),
-                .y = Axis("s", false)};
+    tool::plot::Chart chart{.title = "Stop times of the proofs",
+                            .x = tool::plot::Axis("days before the newest proof", false),
+                            .y = tool::plot::Axis("s", false)};
     const double newest = proof.at("newest").at("utc_ns");
     for (const char* name : {"stop, table", "stop, platform", "watchdog, rest"}) {
-        Curve curve{.name = name, .look = Look::dots};
+        tool::plot::Curve curve{.name = name, .look = tool::plot::Look::dots};
         for (const json& past : history) {
             if (!past.at("times_s").contains(name)) continue;
             curve.add((past.at("utc_ns").get<double>() - newest) / kDay_ns,
