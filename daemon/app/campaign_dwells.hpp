@@ -72,11 +72,11 @@ class CampaignDwells final : public campaign::Dwells {
     void take_done(campaign::Campaign& campaign);
     /// Writes what is left to be written, now.
     void write_out(campaign::Campaign& campaign);
-    /// No result waits to be written.
     /// What the campaign found against the certificate, once.
     [[nodiscard]] std::string take_against_certificate() {
         return std::exchange(against_certificate_, {});
     }
+    /// No result waits to be written.
     [[nodiscard]] bool written() const { return to_write_ == ToWrite::nothing; }
     /// The campaign has ended, and its last verdict is being thought over.
     [[nodiscard]] bool concluding() const { return concluding_ && to_write_ == ToWrite::complete; }

@@ -69,12 +69,12 @@ class Identification {
     StepResult add(const Measurement& measurement) noexcept;
     /// `cut_short`: before its time. A sweep is left out then: it counts whole or not at all.
     DwellSummary end_dwell(bool cut_short = false) noexcept;
-    /// By the filter: each D_F as it is now, after its walk from dwell to dwell.
     /// What was played in the random dwell that ended last, its summary once more with that: its
     /// row has the PSD's level in place of its profile's, may fall or rise again. After everything
     /// else that an end of a dwell brings about, so that a campaign comes out alike live, resumed
     /// and replayed. Nothing where the last dwell was no random one, or is told of already.
     DwellSummary played(const PlayedRandom& played) noexcept;
+    /// By the filter: each D_F as it is now, after its walk from dwell to dwell.
     void estimate(Estimate& out) const noexcept;
     /// After the last ended dwell, as with constant biases: values and sigmas of result(), also of
     /// what is not determined one by one.
