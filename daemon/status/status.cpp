@@ -1,15 +1,28 @@
 #include "daemon/status/status.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace vibrig {
 
 const char* name_of(ChannelState state) noexcept {
-    constexpr std::array<const char*, 7> kNames{"good",    "missing", "flagged", "out_of_range",
-                                                "unbound", "silent",  "never"};
-    return kNames[static_cast<std::size_t>(state)];
+    switch (state) {
+        case ChannelState::good:
+            return "good";
+        case ChannelState::missing:
+            return "missing";
+        case ChannelState::flagged:
+            return "flagged";
+        case ChannelState::out_of_range:
+            return "out_of_range";
+        case ChannelState::unbound:
+            return "unbound";
+        case ChannelState::silent:
+            return "silent";
+        case ChannelState::never:
+            return "never";
+    }
+    return "?";
 }
 
 ChannelState StatusData::channel(std::size_t c) const noexcept {

@@ -1,8 +1,6 @@
 #include "drivers/annunciator/horn.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstddef>
 
 namespace vibrig::drivers {
 
@@ -24,9 +22,17 @@ ShakerSettings link_settings(const HornSettings& settings) {
 }  // namespace
 
 const char* name_of(HornPattern pattern) noexcept {
-    static constexpr std::array kWords{"none", "alarm", "abort", "disobeyed"};
-    const auto index = static_cast<std::size_t>(pattern);
-    return index < kWords.size() ? kWords[index] : "?";
+    switch (pattern) {
+        case HornPattern::none:
+            return "none";
+        case HornPattern::alarm:
+            return "alarm";
+        case HornPattern::abort:
+            return "abort";
+        case HornPattern::disobeyed:
+            return "disobeyed";
+    }
+    return "?";
 }
 
 bool horn_sounds(HornPattern pattern, Time since) noexcept {

@@ -1,22 +1,37 @@
 #include "drivers/can/can_port.hpp"
 
-#include <array>
-#include <cstddef>
-
 #include "drivers/can/can_port_base.hpp"
 
 namespace vibrig::drivers {
 
 const char* name_of(ControllerState state) noexcept {
-    static constexpr std::array kWords{"active", "warning", "passive", "bus off"};
-    const auto index = static_cast<std::size_t>(state);
-    return index < kWords.size() ? kWords[index] : "unknown";
+    switch (state) {
+        case ControllerState::active:
+            return "active";
+        case ControllerState::warning:
+            return "warning";
+        case ControllerState::passive:
+            return "passive";
+        case ControllerState::bus_off:
+            return "bus off";
+    }
+    return "unknown";
 }
 
 const char* name_of(PortState state) noexcept {
-    static constexpr std::array kWords{"absent", "connecting", "running", "degraded", "fault"};
-    const auto index = static_cast<std::size_t>(state);
-    return index < kWords.size() ? kWords[index] : "?";
+    switch (state) {
+        case PortState::absent:
+            return "absent";
+        case PortState::connecting:
+            return "connecting";
+        case PortState::running:
+            return "running";
+        case PortState::degraded:
+            return "degraded";
+        case PortState::fault:
+            return "fault";
+    }
+    return "?";
 }
 
 std::unique_ptr<CanPort> make_can_port(boost::asio::io_context& io,
