@@ -22,6 +22,13 @@ inline constexpr std::array<RegisterTypeRow, 6> kRegisterTypes{
      {"i32", 2'147'483'647.0},
      {"f32", std::numeric_limits<float>::max()},
      {"bits", 1}}};
+static_assert([] {
+    using enum proto::RegisterType;
+    constexpr std::array kInOrder{u16, i16, u32, i32, f32, bits};
+    for (std::size_t i = 0; i < kInOrder.size(); ++i)
+        if (static_cast<std::size_t>(kInOrder[i]) != i) return false;
+    return kInOrder.size() == kRegisterTypes.size();
+}());
 [[nodiscard]] inline const RegisterTypeRow& row_of(proto::RegisterType type) {
     return kRegisterTypes[static_cast<std::size_t>(type)];
 }

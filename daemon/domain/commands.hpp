@@ -26,6 +26,14 @@ struct CommandRequest {
 inline constexpr std::array<const char*, 9> kCommandWords{"arm",      "start",      "pause",
                                                           "resume",   "abort",      "acknowledge",
                                                           "selftest", "commission", "certificate"};
+static_assert([] {
+    using enum CommandRequest::Kind;
+    constexpr std::array kInOrder{arm,         start,    pause,      resume,     abort,
+                                  acknowledge, selftest, commission, certificate};
+    for (std::size_t i = 0; i < kInOrder.size(); ++i)
+        if (static_cast<std::size_t>(kInOrder[i]) != i) return false;
+    return kInOrder.size() == kCommandWords.size();
+}());
 [[nodiscard]] constexpr const char* word_of(CommandRequest::Kind kind) {
     return kCommandWords[static_cast<std::size_t>(kind)];
 }

@@ -107,6 +107,9 @@ class Ring {
 
   private:
     static std::atomic_ref<std::uint64_t> published_to(T& slot) noexcept {
+        using Mark = std::atomic_ref<std::uint64_t>;
+        static_assert(Mark::is_always_lock_free && alignof(T) % Mark::required_alignment == 0 &&
+                      offsetof(T, published_to) % Mark::required_alignment == 0);
         return std::atomic_ref<std::uint64_t>(slot.published_to);
     }
 
@@ -138,7 +141,7 @@ class Ring {
     /// time; memcpy() does so from some length on alone. What checks memory accesses sees memcpy().
     static void copy(const T* from, std::size_t n, T* to) noexcept {
         std::size_t bytes = n * sizeof(T);
-#if defined(__x86_64__) && defined(NDEBUG)
+#if defined(__x86_64__) && !defined(VIBRIG_SANITIZED)
         asm volatile("rep movsb" : "+S"(from), "+D"(to), "+c"(bytes) : : "memory");
 #else
         std::memcpy(static_cast<void*>(to), from, bytes);
