@@ -21,8 +21,8 @@ constexpr std::size_t kFarthest = 60;
 constexpr int kNearest = 50;
 
 std::size_t kind_of(std::size_t parameter) {
-    const std::size_t term = parameter % 10;
-    return term == 0 ? 0 : term < 4 ? 1 : 2;
+    const std::size_t group = estimator::kPublicGroup[parameter % estimator::kGroups];
+    return static_cast<std::size_t>(estimator::kCoefficientTable[group].order);
 }
 
 constexpr std::array<const char*, 3> kKinds{"bias", "linear", "quadratic"};

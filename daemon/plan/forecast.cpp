@@ -106,7 +106,7 @@ std::string gyro_names(const estimator::Settings& settings, std::size_t term) {
     constexpr std::array<std::array<int, 2>, planning::kTerms> kAxes{
         {{-1, -1}, {0, -1}, {1, -1}, {2, -1}, {0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
     std::string text;
-    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+    for (std::size_t gyro = 0; gyro < estimator::kGyros; ++gyro) {
         std::size_t a = role(gyro, kAxes[term][0]);
         std::string name = "D_";
         if (kAxes[term][1] < 0) {
@@ -155,12 +155,12 @@ Forecast forecast(const estimator::Settings& settings, const std::vector<Planned
 std::string forecast_table(const Forecast& forecast) {
     const auto& names = estimator::parameter_names();
     std::string text = "expected standard errors  gyro x      gyro y      gyro z\n";
-    for (std::size_t k = 0; k < estimator::kParameters / 3; ++k) {
+    for (std::size_t k = 0; k < estimator::kGroups; ++k) {
         std::string name = names[k];
         name.pop_back();
         text += printed("  %-5s %-16s", name.c_str(), estimator::parameter_unit(k));
         for (std::size_t gyro = 0; gyro < 3; ++gyro) {
-            const double sigma = forecast.sigma[10 * gyro + k];
+            const double sigma = forecast.sigma[estimator::kGroups * gyro + k];
             text += std::isfinite(sigma) ? printed("%12.3g", sigma) : printed("%12s", "-");
         }
         text += '\n';
