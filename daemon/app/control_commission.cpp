@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <utility>
 
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/bus_bits.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig {
 
@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kFineBits = 12;
 constexpr const char* kNoScript = "answers: persons answer on a real rig";
-constexpr double kDegPerRad = 180 / std::numbers::pi;
+using estimator::kDegPerRad;
 
 commission::Vec3 in_degrees(const std::array<double, 3>& rad) {
     return {rad[0] * kDegPerRad, rad[1] * kDegPerRad, rad[2] * kDegPerRad};

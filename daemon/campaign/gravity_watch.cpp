@@ -5,20 +5,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
+
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::campaign {
 
 namespace {
 
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+using estimator::kDegPerRad;
+
 constexpr std::size_t kMostLooks = 8, kMostSuspects = 3;
 constexpr std::array kGimbals{"outer", "inner", "azimuth"};
 
 double angle_deg(const Vector& a, const Vector& b) {
     const Vector across = cross(a, b);
-    return std::atan2(std::sqrt(dot(across, across)), dot(a, b)) * kDegreesPerRadian;
+    return std::atan2(std::sqrt(dot(across, across)), dot(a, b)) * kDegPerRad;
 }
 
 }  // namespace
@@ -45,8 +47,7 @@ GravityWatch::Verdict GravityWatch::judge(const rt::MeanMotion& second, const Ve
     newest_.vibration_deg =
         newest_.vibration_g < limits_.vibration_g
             ? 0
-            : std::atan2(std::sqrt(std::max(power - along * along, 0.0)), along) *
-                  kDegreesPerRadian;
+            : std::atan2(std::sqrt(std::max(power - along * along, 0.0)), along) * kDegPerRad;
     newest_.vibration_told = !(newest_.vibration_deg <= limits_.vibration_deg);
     const bool size = !at_rest || std::abs(newest_.size_g - 1) <= limits_.size;
     newest_.size_told = !size;

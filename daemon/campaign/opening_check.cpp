@@ -8,6 +8,7 @@
 
 #include "estimator/commissioning/opening.hpp"
 #include "estimator/commissioning/told_apart.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::campaign {
 
@@ -30,7 +31,7 @@ room::DwellMean mean_of(const std::vector<rt::MeanMotion>& seconds, bool drifts)
     room::DwellMean mean;
     mean.level_known = drifts;
     const double n = static_cast<double>(seconds.size());
-    constexpr double kDegPerRad = 180 / std::numbers::pi;
+    using estimator::kDegPerRad;
     for (std::size_t i = 0; i < 3; ++i) {
         double t = 0, tt = 0, a = 0, ta = 0, last = seconds.front().angle[i];
         const double first = last;

@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::campaign {
 namespace {
 
-constexpr double kRadPerDeg = estimator::kPi / 180;
+using estimator::kRadPerDeg;
 
 }  // namespace
 

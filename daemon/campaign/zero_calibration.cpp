@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
@@ -16,8 +16,9 @@ namespace zeros = estimator::zeros;
 
 namespace {
 
-constexpr double kRadian = std::numbers::pi / 180;
-constexpr double kArcsec = kRadian / 3600;
+using estimator::kRadPerDeg;
+
+constexpr double kArcsec = kRadPerDeg / 3600;
 constexpr double kSureness = 3;  // standard deviations
 // The gimbals take the shorter way round, and of half a turn neither way is the shorter: what a
 // slew ends beside its target would decide. 2 deg short of it at either end, it is decided.
@@ -49,7 +50,7 @@ std::vector<Vector> slews_of(const zeros::Way& way, const RigFrame& frame) {
 
 zeros::CalibrationSettings ZeroCalibration::plan(const zeros::Way& way) const {
     zeros::CalibrationSettings s;
-    s.site.latitude_rad = kRadian * rig_.latitude_deg;
+    s.site.latitude_rad = kRadPerDeg * rig_.latitude_deg;
     s.site.gravity_mps2 = rig_.gravity_mps2;
     s.plan.targets_deg = way.upright == 2 ? kAzimuths_deg : kInner_deg;
     s.plan.rate_deg_s = settings_.slew_deg_per_s;
@@ -163,7 +164,7 @@ Vector ZeroCalibration::target_deg() const {
 
 void ZeroCalibration::levelled_at(const Vector& encoder_rad) {
     level_deg_.emplace();
-    for (std::size_t i = 0; i < 3; ++i) (*level_deg_)[i] = encoder_rad[i] / kRadian;
+    for (std::size_t i = 0; i < 3; ++i) (*level_deg_)[i] = encoder_rad[i] / kRadPerDeg;
 }
 
 void ZeroCalibration::add(const rt::Motion& motion) {

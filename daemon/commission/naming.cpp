@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/commission/procedure.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::commission {
 
@@ -15,7 +16,8 @@ namespace room = estimator::commissioning;
 
 namespace {
 
-constexpr double kDegree = 57.29577951308232;
+using estimator::kDegPerRad;
+
 constexpr int kMostExtra = 3;
 constexpr double kSeparates_g = 10e-3;
 constexpr double kWatched_deg = 40;
@@ -203,7 +205,7 @@ void Procedure::separate() {
 
 double Procedure::travel_to(std::size_t gimbal, double angle_deg) const {
     const auto c = static_cast<std::size_t>(named_.channel[gimbal]);
-    const double at = kDegree * named_.angles(start_)[static_cast<int>(gimbal)];
+    const double at = kDegPerRad * named_.angles(start_)[static_cast<int>(gimbal)];
     const double degrees =
         room::angle_units()[static_cast<std::size_t>(named_.unit[gimbal])].degrees;
     return named_.sign[gimbal] * std::remainder(angle_deg - at, 360.0) / (degrees * ratio_[c]);

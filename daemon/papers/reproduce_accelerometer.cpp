@@ -6,6 +6,7 @@
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 
@@ -15,13 +16,14 @@ namespace {
 
 using namespace estimator::zeros;
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+using estimator::kRadPerDeg;
+
 constexpr double kThirteenMinutes = 780;
 constexpr double kPeriod = 0.01;
 
 CalibrationSettings paper() {
     CalibrationSettings s;
-    s.site.latitude_rad = 30 * kDegree;
+    s.site.latitude_rad = 30 * kRadPerDeg;
     s.plan.duration_s = kThirteenMinutes;
     s.noise.scale_factor = 0;
     return s;
@@ -130,7 +132,7 @@ void add_levels(Reproduction& table) {
     for (const auto& [mg, published, rounded, half] :
          {Level{0.5, "about 2'", 2, 0.5}, Level{0.15, "0.5'", 0.5, 0.05},
           Level{0.05, "0.2'", 0.2, 0.05}}) {
-        const double arcmin = std::asin(1e-3 * mg) / kDegree * 60;
+        const double arcmin = std::asin(1e-3 * mg) / kRadPerDeg * 60;
         table.add(printed("%g mg as level", mg), published, printed("%.3f'", arcmin),
                   std::abs(arcmin - rounded) <= half);
     }

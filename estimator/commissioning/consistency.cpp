@@ -41,15 +41,15 @@ DwellMean DwellMeans::mean(double kappa, bool level_known) const noexcept {
     mean.level_known = level_known;
     mean.begin_s = first_s_;
     mean.duration_s = last_s_ - first_s_;
-    constexpr double kDegPerHour = 3600 * 180 / kPi;
+    constexpr double kDegPerHourOfRadPerS = 3600 * 180 / kPi;
     const double spread = tt_ - t_ * t_ / count_;  // of the times about their mean
     for (std::size_t i = 0; i < 3; ++i) {
         mean.encoder_rad[i] = first_[i] + a_[i] / count_;
         const double slope = (ta_[i] - t_ * a_[i] / count_) / spread;
-        mean.slope_deg_h[i] = kDegPerHour * slope;
+        mean.slope_deg_h[i] = kDegPerHourOfRadPerS * slope;
         const double scatter = aa_[i] - a_[i] * a_[i] / count_ - slope * slope * spread;
-        mean.slope_variance[i] =
-            kDegPerHour * kDegPerHour * std::max(0.0, scatter) / (count_ - 2) / spread;
+        mean.slope_variance[i] = kDegPerHourOfRadPerS * kDegPerHourOfRadPerS *
+                                 std::max(0.0, scatter) / (count_ - 2) / spread;
         mean.force_g[i] = force_[i] / count_;
     }
     return mean;

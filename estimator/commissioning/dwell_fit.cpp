@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
@@ -21,7 +22,6 @@ constexpr double kModelSigma = 0.05;
 /// Of a normal variate: false alarms once in 3 million times.
 constexpr double kByChance = 5;
 constexpr double kBiasSigma = 20, kSquareSigma = 2;
-constexpr double kDegPerRad = 180 / kPi;
 constexpr int kFitted = static_cast<int>(kParameters) + 2;
 
 using Fitted = Eigen::Matrix<double, kFitted, 1>;

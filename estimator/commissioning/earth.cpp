@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 
@@ -16,7 +17,6 @@ namespace vibrig::estimator::commissioning {
 
 namespace {
 
-constexpr double kDegree = 180 / kPi;
 // ln odds: the most that a measured quantity against a statement may weigh (100 : 1), what a look
 // at a drawing or a hand's sense weighs (40 : 1), and what is asked of all together.
 constexpr double kMostOdds = 4.6, kSeenOdds = 3.7, kAsked = 6;
@@ -30,7 +30,7 @@ using Unknown = Eigen::Matrix<double, kUnknown, 1>;
 
 /// Level axes north, east, up in those of a rig whose outer axis points up by the elevation.
 Eigen::Matrix3d rig_from_level(double elevation_deg) {
-    const double c = std::cos(elevation_deg / kDegree), s = std::sin(elevation_deg / kDegree);
+    const double c = std::cos(elevation_deg / kDegPerRad), s = std::sin(elevation_deg / kDegPerRad);
     Eigen::Matrix3d r;
     r << c, 0, s, -s, 0, c, 0, 1, 0;
     return r;
@@ -66,7 +66,7 @@ std::vector<Witness> hear(const Description& d, const std::optional<EarthRate>& 
                           const Statements& said) {
     std::vector<Witness> witnesses;
     if (rate && said.latitude_deg) {
-        const double stated = kEarthRateDegPerHour * std::sin(*said.latitude_deg / kDegree);
+        const double stated = kEarthRateDegPerHour * std::sin(*said.latitude_deg / kDegPerRad);
         const double sigma = rate->sigma[2];
         witnesses.push_back(
             {"latitude", limited(2 * rate->neu[2] * stated / (sigma * sigma), kMostOdds)});
@@ -126,10 +126,10 @@ std::string contradiction(const EarthRate& rate, const Statements& said) {
 
 }  // namespace
 
-double EarthRate::azimuth_deg() const { return std::atan2(-neu[1], neu[0]) * kDegree; }
+double EarthRate::azimuth_deg() const { return std::atan2(-neu[1], neu[0]) * kDegPerRad; }
 
 double EarthRate::latitude_deg() const {
-    return std::acos(std::min(1.0, neu.head<2>().norm() / kEarthRateDegPerHour)) * kDegree;
+    return std::acos(std::min(1.0, neu.head<2>().norm() / kEarthRateDegPerHour)) * kDegPerRad;
 }
 
 double EarthRate::latitude_sigma_deg() const {
@@ -137,7 +137,7 @@ double EarthRate::latitude_sigma_deg() const {
     // Where the cosine is flat the error is that of the second order.
     const double sine =
         std::sqrt(std::max(0.0, 1 - std::pow(horizontal / kEarthRateDegPerHour, 2)));
-    return kDegree * sd / kEarthRateDegPerHour /
+    return kDegPerRad * sd / kEarthRateDegPerHour /
            std::max(sine, std::sqrt(2 * sd / kEarthRateDegPerHour));
 }
 
@@ -179,7 +179,7 @@ Eigen::Vector3d platform_rate(const Description& d, const FreeDrift& drift, cons
 }
 
 std::string time_unit_doubt(double horizontal, double latitude_deg) {
-    const double expected = kEarthRateDegPerHour * std::cos(latitude_deg / kDegree);
+    const double expected = kEarthRateDegPerHour * std::cos(latitude_deg / kDegPerRad);
     const double ratio = horizontal / expected;
     if (ratio >= 0.9 && ratio <= 1.1) return {};
     constexpr std::array<std::pair<double, const char*>, 6> kFactors{

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <optional>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 
@@ -20,8 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kRad = kPi / 180;
-constexpr double kStepOuter = 9 * kRad, kStepInner = 12 * kRad;
+constexpr double kStepOuter = 9 * kRadPerDeg, kStepInner = 12 * kRadPerDeg;
 constexpr std::size_t kNodes = 3;
 /// Of twice the ln ratio: what is this far beyond the best needs no closer look.
 constexpr double kFarBeyond = 120;
@@ -72,7 +72,7 @@ Linear solve_linear(const Class& c, const Bend& bend, const GravitySettings& s) 
     Linear result;
     result.solution = linear_algebra::PivotedCholesky(normal).solve(right);
     const double rest = std::max(0.0, all - right.cwiseProduct(result.solution).sum());
-    const double lean = bend[2] / (s.elevation_sigma_deg * kRad);
+    const double lean = bend[2] / (s.elevation_sigma_deg * kRadPerDeg);
     result.cost = rest / variance + lean * lean;
     return result;
 }
@@ -126,7 +126,7 @@ std::pair<double, Bend> refine(const Class& c, Bend bend, const GravitySettings&
             r.segment<3>(static_cast<Eigen::Index>(3 * k)) =
                 (c.force[k] - linear.solution.transpose() * row) / s.force_sigma_g;
         }
-        r[static_cast<Eigen::Index>(3 * n)] = at[2] / (s.elevation_sigma_deg * kRad);
+        r[static_cast<Eigen::Index>(3 * n)] = at[2] / (s.elevation_sigma_deg * kRadPerDeg);
         return linear.cost;
     };
     const auto rows = static_cast<Eigen::Index>(3 * n + 1);
@@ -209,12 +209,12 @@ struct Structured {
 
 Full prior_sigma(const GravitySettings& s) {
     Full sigma = Full::Constant(HUGE_VAL);
-    sigma[kElevation] = s.elevation_sigma_deg * kRad;
+    sigma[kElevation] = s.elevation_sigma_deg * kRadPerDeg;
     sigma.segment<3>(kZeros).setConstant(s.zero_sigma_g);
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k)
             sigma[kErrors + 3 * i + k] =
-                i == k ? s.gain_sigma : s.misalignment_sigma_arcmin / 60 * kRad;
+                i == k ? s.gain_sigma : s.misalignment_sigma_arcmin / 60 * kRadPerDeg;
     return sigma;
 }
 
@@ -301,8 +301,8 @@ Description describe(const Class& c, const Structured& fit) {
     Description d = c.names;
     for (int k = 0; k < 3; ++k)
         d.zero_deg[static_cast<std::size_t>(k)] =
-            std::remainder(d.sign[static_cast<std::size_t>(k)] * fit.p[k] / kRad, 360.0);
-    d.elevation_deg = fit.p[kElevation] / kRad;
+            std::remainder(d.sign[static_cast<std::size_t>(k)] * fit.p[k] / kRadPerDeg, 360.0);
+    d.elevation_deg = fit.p[kElevation] / kRadPerDeg;
     d.accelerometers = fit.wiring * (Matrix3d::Identity() + error_of(fit.p));
     d.zero_g = fit.p.segment<3>(kZeros);
     return d;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 
 namespace {
 
-constexpr double kRadPerDeg = kPi / 180;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 

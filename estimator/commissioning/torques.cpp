@@ -5,12 +5,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -18,7 +18,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-constexpr double kPerRadian = 180 / std::numbers::pi;
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
 constexpr std::array<char, 3> kCommand{'X', 'Y', 'Z'};
 
@@ -102,26 +101,26 @@ std::string turn_axes(TorqueFinding& f, const TorqueSettings& settings) {
     for (std::size_t k = 0; k < 3; ++k)
         axes.col(f.axis[k]) = f.sign[k] / f.scale[k] * f.response.col(static_cast<int>(k));
     const double turn = std::atan2(axes(1, 0) - axes(0, 1), axes(0, 0) + axes(1, 1));
-    if (std::abs(turn) * kPerRadian > settings.turn_deg)
+    if (std::abs(turn) * kDegPerRad > settings.turn_deg)
         return words(
             "the torquers' axes are turned by %.1f deg about z against the accelerometers, "
             "%g at most",
-            turn * kPerRadian, settings.turn_deg);
+            turn * kDegPerRad, settings.turn_deg);
     const Matrix3d about_z = Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix();
     const Matrix3d left = about_z.transpose() * axes;
     for (std::size_t k = 0; k < 3; ++k) {
         const int a = f.axis[k];
-        const double off = std::acos(std::clamp(left(a, a), -1.0, 1.0)) * kPerRadian;
+        const double off = std::acos(std::clamp(left(a, a), -1.0, 1.0)) * kDegPerRad;
         if (off > settings.skew_deg)
             return words(
                 "torque command %c turns the platform %.1f deg off its axis %c, %g at most",
                 kCommand[k], off, kAxis[static_cast<std::size_t>(a)], settings.skew_deg);
     }
-    f.turn_arcmin = turn * kPerRadian * 60;
+    f.turn_arcmin = turn * kDegPerRad * 60;
     f.response = about_z.transpose() * f.response;
     f.description.accelerometers *= about_z;
     f.description.zero_deg[2] = std::remainder(
-        f.description.zero_deg[2] + f.description.sign[2] * turn * kPerRadian, 360.0);
+        f.description.zero_deg[2] + f.description.sign[2] * turn * kDegPerRad, 360.0);
     return {};
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
@@ -16,7 +17,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 constexpr double kScale = 0.05, kSkew_deg = 3;
-constexpr double kDegreesOfRadian = 180 / std::numbers::pi;
 
 /// In platform axes, deg.
 Vector3d turn_of(const Description& d, const CountedTurn& one) {
@@ -24,7 +24,7 @@ Vector3d turn_of(const Description& d, const CountedTurn& one) {
     Vector3d moved = d.angles(one.after) - before;
     for (double& angle : moved) angle = std::remainder(angle, 2 * std::numbers::pi);
     const Vector3d middle = before + 0.5 * moved;
-    return kDegreesOfRadian * (Kinematics{Settings{}}.pose(middle).m.inverse() * moved);
+    return kDegPerRad * (Kinematics{Settings{}}.pose(middle).m.inverse() * moved);
 }
 
 }  // namespace
@@ -61,8 +61,7 @@ TurnFinding find_by_turns(const Description& d, const std::vector<CountedTurn>& 
                 "XYZ"[g], f.scale[g]);
             return f;
         }
-        const double skew =
-            kDegreesOfRadian * std::acos(std::min(1.0, std::abs(row[axis]) / row.norm()));
+        const double skew = kDegPerRad * std::acos(std::min(1.0, std::abs(row[axis]) / row.norm()));
         if (!(skew <= kSkew_deg)) {
             f.why = words("gyro increments %c count about an axis %.1f deg off platform %c",
                           "XYZ"[g], skew, "xyz"[axis]);

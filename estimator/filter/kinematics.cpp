@@ -5,10 +5,6 @@
 #include "estimator/filter/product.hpp"
 
 namespace vibrig::estimator {
-namespace {
-constexpr double kRadPerDeg = kPi / 180.0;
-}
-
 double wrap(double angle_rad) noexcept {
     // std::remainder gives the same, slowly: up to one and a half turns the difference is exact.
     if (std::abs(angle_rad) <= kPi) return angle_rad;

@@ -3,12 +3,11 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/settings.hpp"
 
 namespace vibrig::estimator {
 
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kArcsecPerRad = 206264.80625;
 inline constexpr double kEarthRateDegPerHour = 15.041067;
 /// The gimbals are singular at 90 deg of the inner angle; measurements beyond this are refused.
 inline constexpr double kMaxInnerAngleRad = 80.0 * kPi / 180.0;

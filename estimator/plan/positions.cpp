@@ -5,13 +5,13 @@
 #include <numbers>
 #include <set>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::plan {
 
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180;
 constexpr double kDust = 1e-9;
 constexpr double kLargestInner_deg = 80;  // beyond, the kinematics come near their singularity
 
@@ -37,8 +37,8 @@ std::vector<Vec3> ways(const SignedAxis& up, Vec3 d) {
     std::vector<Vec3> result;
     const double flat = std::hypot(d[0], d[1]);
     const auto add = [&](double alpha, double beta, double gamma) {
-        result.push_back(
-            {wrapped_deg(alpha / kDeg), wrapped_deg(beta / kDeg), wrapped_deg(gamma / kDeg)});
+        result.push_back({wrapped_deg(alpha / kRadPerDeg), wrapped_deg(beta / kRadPerDeg),
+                          wrapped_deg(gamma / kRadPerDeg)});
     };
     constexpr double pi = std::numbers::pi;
     switch (up.axis) {
@@ -82,7 +82,8 @@ Vec3 position_of(const Settings& settings, const Vec3& gimbal_deg) {
 
 Vec3 up_at(const Settings& settings, const Vec3& position_deg) {
     const Vec3 gimbal = gimbal_deg(settings, position_deg);
-    const Eigen::Vector3d angles(gimbal[0] * kDeg, gimbal[1] * kDeg, gimbal[2] * kDeg);
+    const Eigen::Vector3d angles(gimbal[0] * kRadPerDeg, gimbal[1] * kRadPerDeg,
+                                 gimbal[2] * kRadPerDeg);
     const Eigen::Vector3d u = Kinematics(settings).pose(angles).up;
     return {u[0], u[1], u[2]};
 }

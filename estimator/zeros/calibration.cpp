@@ -40,8 +40,8 @@ void check_settings(const CalibrationSettings& s) {
     };
     s.plan.check();
     require(s.upright >= 0 && s.upright < 3, "upright axis", s.upright, "0 (x), 1 (y) or 2 (z)");
-    require(std::abs(s.site.latitude_rad) < 89 * kDeg, "latitude", s.site.latitude_rad / kDeg,
-            "degrees, -89 to 89");
+    require(std::abs(s.site.latitude_rad) < 89 * kRadPerDeg, "latitude",
+            s.site.latitude_rad / kRadPerDeg, "degrees, -89 to 89");
     require(s.site.gravity_mps2 > 0 && std::isfinite(s.site.gravity_mps2), "gravity",
             s.site.gravity_mps2, "m/s^2, more than 0");
     require(s.update_s > 0 && s.update_s <= 10, "update interval", s.update_s,
@@ -129,7 +129,7 @@ struct Calibration::Impl {
     void begin(const Increment& in) {
         has_azimuth = std::isfinite(in.azimuth_rad);
         const double azimuth =
-            has_azimuth ? in.azimuth_rad : settings.plan.targets_deg.front() * kDeg;
+            has_azimuth ? in.azimuth_rad : settings.plan.targets_deg.front() * kRadPerDeg;
         filter.emplace(settings, azimuth);
         azimuth_rad = azimuth_before = azimuth;
         if (has_azimuth) gain.emplace(settings.initial.gyro_bias_deg_h * kDegPerHour);
@@ -161,11 +161,11 @@ struct Calibration::Impl {
         if (gap_s > 1.5 * period_s || !why.empty()) {
             const double part = period_s > 0 ? gap_s / period_s : 1;
             filter->advance(last_turn * part, last_velocity * part, gap_s);
-            const double turn = settings.plan.rate_deg_s * kDeg * gap_s;
+            const double turn = settings.plan.rate_deg_s * kRadPerDeg * gap_s;
             turned_in_all_rad += (settings.inverted ? -1 : 1) * last_turn[2] * part;
             if (gain) gain->loosen(turn);
             if (gap_s > kLongestGap_s) {
-                filter->loosen(settings.initial.tilt_deg * kDeg + turn,
+                filter->loosen(settings.initial.tilt_deg * kRadPerDeg + turn,
                                settings.initial.velocity_mps, settings.initial.position_m);
             } else {
                 filter->loosen(turn, 0.01 * settings.site.gravity_mps2 * gap_s, 0);
@@ -189,7 +189,7 @@ struct Calibration::Impl {
     bool watch_motion(double now_s) {
         const double moved =
             has_azimuth ? std::remainder(azimuth_rad - azimuth_before, 2 * kPi) : turned_rad;
-        const double rate = moved / interval_s / kDeg;
+        const double rate = moved / interval_s / kRadPerDeg;
         azimuth_before = azimuth_rad;
         const double planned = settings.plan.rate_deg_s;
         if (!settings.plan.turns() || planned < kSlowest_deg_s) return true;

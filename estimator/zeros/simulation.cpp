@@ -21,12 +21,12 @@ struct UnitSimulation::Impl {
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 
     [[nodiscard]] double azimuth(double t) const {
-        return settings.plan.azimuth_deg(t * real_rate) * kDeg;
+        return settings.plan.azimuth_deg(t * real_rate) * kRadPerDeg;
     }
     [[nodiscard]] Eigen::Matrix3d attitude(double t) const {
-        const double psi = azimuth(t) + errors.azimuth_deg * kDeg;
+        const double psi = azimuth(t) + errors.azimuth_deg * kRadPerDeg;
         Eigen::Matrix3d turned =
-            rotation({errors.tilt_east_deg * kDeg, errors.tilt_north_deg * kDeg, 0}) *
+            rotation({errors.tilt_east_deg * kRadPerDeg, errors.tilt_north_deg * kRadPerDeg, 0}) *
             rotation({0, 0, psi});
         if (settings.inverted) {
             turned.col(1) *= -1;
@@ -81,9 +81,9 @@ struct UnitSimulation::Impl {
             vector(errors.scale).cwiseProduct(dv) + matrix(errors.accelerometer_cross) * dv;
         dv += seen + vector(errors.zero_mg) * (1e-3 * site.gravity_mps2 * period_s);
         turn += (matrix(errors.gyro_cross) * turn).eval();
-        turn += vector(errors.gyro_bias_deg_h) * (kDeg / 3600 * period_s);
+        turn += vector(errors.gyro_bias_deg_h) * (kRadPerDeg / 3600 * period_s);
         const double root = std::sqrt(period_s);
-        turn += noise(settings.noise.angle_random_walk * kDeg / 60 * root);
+        turn += noise(settings.noise.angle_random_walk * kRadPerDeg / 60 * root);
         dv += noise(settings.noise.velocity_random_walk * site.gravity_mps2 * root);
         for (std::size_t i = 0; i < 3; ++i) {
             in.turn_rad[i] = turn[static_cast<Eigen::Index>(i)];

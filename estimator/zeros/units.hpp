@@ -5,14 +5,13 @@
 #include <cstdio>
 #include <string>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/calibration.hpp"
 
 namespace vibrig::estimator::zeros {
 
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kDeg = kPi / 180;             ///< rad
-inline constexpr double kDegPerHour = kDeg / 3600;    ///< rad/s
-inline constexpr double kDegPerRootHour = kDeg / 60;  ///< rad/sqrt(s)
+inline constexpr double kDegPerHour = kRadPerDeg / 3600;    ///< rad/s
+inline constexpr double kDegPerRootHour = kRadPerDeg / 60;  ///< rad/sqrt(s)
 
 [[nodiscard]] inline Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
 

@@ -40,9 +40,10 @@ ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
     const Site& site = settings.site;
     const double metre = start.position_m / site.radius_m;
     FilterVector sigma;
-    sigma << start.tilt_deg * kDeg, start.tilt_deg * kDeg, start.azimuth_deg * kDeg,
-        Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
-        start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
+    sigma << start.tilt_deg * kRadPerDeg, start.tilt_deg * kRadPerDeg,
+        start.azimuth_deg * kRadPerDeg, Eigen::Vector3d::Constant(start.velocity_mps), metre,
+        metre / std::cos(site.latitude_rad), start.position_m,
+        Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
         Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2),
         Eigen::Matrix<double, 6, 1>::Zero();
     for (std::size_t k = 0; k < 6; ++k)

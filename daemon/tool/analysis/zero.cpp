@@ -48,7 +48,7 @@ struct Options {
 
 zeros::CalibrationSettings settings_of(const Options& options) {
     zeros::CalibrationSettings s = options.calibration;
-    s.site.latitude_rad = options.latitude_deg * kDegree;
+    s.site.latitude_rad = options.latitude_deg * estimator::kRadPerDeg;
     s.noise.scale_factor = options.scale_ppm * 1e-6;
     s.noise.misalignment = options.misalignment_arcsec * kArcsec;
     s.plan.targets_deg = options.slews;
@@ -120,7 +120,8 @@ zeros::Calibration calibration_of(const Options& options, const std::string& fil
             in.turn_rad[i] = columns[i].values[k] * kArcsec;
             in.velocity_mps[i] = columns[i + 3].values[k];
         }
-        in.azimuth_rad = azimuth.values.empty() ? std::nan("") : azimuth.values[k] * kDegree;
+        in.azimuth_rad =
+            azimuth.values.empty() ? std::nan("") : azimuth.values[k] * estimator::kRadPerDeg;
         if (!calibration.add(in)) break;
     }
     return calibration;
@@ -154,7 +155,7 @@ void write_increments(const Options& options, const zeros::CalibrationSettings& 
         out << in.time_s;
         for (const double turn : in.turn_rad) out << ',' << turn / kArcsec;
         for (const double dv : in.velocity_mps) out << ',' << dv;
-        out << ',' << in.azimuth_rad / kDegree << '\n';
+        out << ',' << in.azimuth_rad / estimator::kRadPerDeg << '\n';
     }
     out.close();
     if (!out) {

@@ -61,7 +61,8 @@ Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& 
              {"zero_mg", proto::number_or_null(axis.zero_mg)},
              {"sigma_mg", proto::number_or_null(axis.sigma_mg)},
              {"filter_sigma_mg", proto::number_or_null(axis.filter_sigma_mg)},
-             {"level_arcmin", proto::number_or_null(axis.zero_mg * 1e-3 / kDegree * 60)},
+             {"level_arcmin",
+              proto::number_or_null(axis.zero_mg * 1e-3 / estimator::kRadPerDeg * 60)},
              {"movement_mg", proto::number_or_null(axis.movement_mg)},
              {"converged_s", axis.converged_s ? Json(*axis.converged_s) : Json(nullptr)}});
     }
@@ -97,7 +98,7 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
     for (std::size_t i = 0; i < 3; ++i) {
         const zeros::AxisResult& axis = r.axis[i];
         out += printed("%-4s %14.5f %12.5f %11.4f   %s\n", kAxisLetters[i], axis.zero_mg,
-                       axis.sigma_mg, axis.zero_mg * 1e-3 / kDegree * 60,
+                       axis.sigma_mg, axis.zero_mg * 1e-3 / estimator::kRadPerDeg * 60,
                        axis.converged_s ? printed("%.0f s", *axis.converged_s).c_str() : "no");
     }
     out += printed(

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
@@ -15,8 +16,8 @@ namespace vibrig::tool::zero_command {
 namespace zeros = estimator::zeros;
 using Json = nlohmann::ordered_json;
 
-inline constexpr double kDegree = 3.14159265358979323846 / 180;
-inline constexpr double kArcsec = kDegree / 3600;
+using estimator::kRadPerDeg;
+inline constexpr double kArcsec = kRadPerDeg / 3600;
 inline constexpr std::array kAxisLetters{"x", "y", "z"};
 
 [[nodiscard]] plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace);

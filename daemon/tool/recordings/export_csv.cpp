@@ -5,19 +5,19 @@
 #include <cmath>
 #include <cstdint>
 #include <iostream>
-#include <numbers>
 #include <stdexcept>
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/replay.hpp"
+#include "estimator/filter/angles.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
 
 namespace {
 
-constexpr double kDegreesOfRadian = 180 / std::numbers::pi;
+using estimator::kDegPerRad;
 
 /// Hz at a time, by the sweep's readings: between two of them its logarithm goes straight.
 double swept_hz(const std::vector<std::array<double, 2>>& readings, double time_s) {
@@ -115,7 +115,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
             const double since_s = drivers::to_seconds(sample.time - dwell.order->from);
             row.time_s = begin_s + since_s;
             for (std::size_t k = 0; k < 3; ++k) {
-                row.angle_deg[k] = sample.angle[k] * kDegreesOfRadian;
+                row.angle_deg[k] = sample.angle[k] * kDegPerRad;
                 row.force_g[k] = sample.force[k] - dwell.order->zero_g[k];
             }
             columns.put(row, since_s);

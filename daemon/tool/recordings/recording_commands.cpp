@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -19,13 +18,14 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/export_csv.hpp"
 #include "daemon/tool/recordings/mat_file.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::tool {
 
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+using estimator::kDegPerRad;
 
 void export_mat(const record::Campaign& campaign, const std::string& path) {
     std::vector<double> time, sequence, angle, force, table, quality, run, position;
@@ -40,7 +40,7 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
         const auto& s = campaign.samples[i];
         time.push_back(drivers::to_seconds(s.time - origin));
         sequence.push_back(s.sequence);
-        for (const double a : s.angle) angle.push_back(a * kDegreesPerRadian);
+        for (const double a : s.angle) angle.push_back(a * kDegPerRad);
         force.insert(force.end(), s.force.begin(), s.force.end());
         table.push_back(s.table_accel);
         for (std::size_t k = 0; k < drivers::kChannels; ++k)
