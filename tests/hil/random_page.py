@@ -63,9 +63,13 @@ def look(checks, programs, folder):
         until("at rest the page says so", f"({ROWS}).kind === 'rest'")
         live_page.start_campaign(checks, rig, "a campaign with a sine and random dwells starts")
         recording = "document.getElementById('state').textContent === 'recording'"
-        until("a sine is shown with its frequency", f"{recording} && ({ROWS}).kind === 'sine' && ({ROWS}).frequency === '15.00 Hz'")
-        checks.check(rows_of(page).get("commanded", "").endswith(" g peak"), "and its peak", str(rows_of(page)))
-        checks.equal(page.ask("evaluate", script="document.getElementById('c-psd').hidden").get("value"), True, "a sine has no PSD")
+        # All of it in the look that finds the sine: asked once more, a page may be in the next dwell.
+        until("a sine is shown with its frequency",
+              f"(() => {{ const rows = {ROWS}; if (!({recording} && rows.kind === 'sine' && rows.frequency === '15.00 Hz')) return false; "
+              "window.sine = [rows.commanded, document.getElementById('c-psd').hidden]; return true; })()")
+        commanded, hidden = page.ask("evaluate", script="window.sine").get("value") or ("", None)
+        checks.check(commanded.endswith(" g peak"), "and its peak", commanded)
+        checks.equal(hidden, True, "a sine has no PSD")
         until("then a random dwell", f"{recording} && ({ROWS}).kind === 'random' && ({ROWS})['controller says'] === 'at level' && ({ROWS}).table !== 'not known'")
         under_random(checks, page, rows_of(page))
         shots(checks, page, "random")
