@@ -13,7 +13,6 @@
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/configuration/random_profiles.hpp"
 #include "daemon/results/result_json.hpp"
-#include "estimator/spectrum/read_sweep.hpp"
 
 namespace vibrig {
 
@@ -36,21 +35,12 @@ std::string result_configuration(const configuration::Loaded& loaded) {
 CampaignDwells::CampaignDwells(const With& with)
     : with_(with),
       configuration_(with.loaded.configuration),
-      noise_monitor_(configuration_.estimator,
-                     [this](Severity severity, const std::string& text) {
-                         with_.events.log(severity, "noise", text);
-                     }),
       adaptive_(adaptive_plan(configuration_)) {}
 
 void CampaignDwells::begin() {
     planning_.abandon();  // of a campaign that was aborted
     assessing_.abandon();
-    with_.identification = estimator::Identification(configuration_.estimator);
-    with_.identification.reserve(planned_dwells());
-    noise_monitor_.reset();
-    sweeps_.clear();
-    psds_.clear();
-    psd_before_.clear();
+    with_.book.begin(planned_dwells());
     verdict_told_.clear();
     take_type_prior();
     const std::lock_guard lock(mutex_);
@@ -67,17 +57,16 @@ std::size_t CampaignDwells::planned_dwells() const {
 }
 
 bool CampaignDwells::order(const rt::DwellOrder& order) {
-    const bool taken = with_.stage.order(order);
-    if (taken && !order.cancel) ++with_estimator_;
+    const bool taken = with_.book.order(with_.stage, order);
     if (taken && !order.cancel) ordered_ = order;
     if (taken && with_.recorder)
-        with_.recorder->ordered(order, with_.clock.now(), with_.identification.noise());
+        with_.recorder->ordered(order, with_.clock.now(), with_.book.identification().noise());
     return taken;
 }
 
 void CampaignDwells::swept(const estimator::spectrum::Sweep& sweep,
                            const std::vector<std::array<double, 2>>& readings) {
-    sweeps_.push_back(sweep);
+    with_.book.spectrum().sweeps.push_back(sweep);
     if (!with_.recorder) return;
     record::Swept rows;
     for (const auto& [time_s, hz] : readings)
@@ -92,7 +81,8 @@ std::optional<campaign::Next> CampaignDwells::next(const std::array<double, 3>& 
     // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
     // waits for this thread, so that there the time is none.
     std::optional<plan::AdaptivePlan::Decision> decision;
-    const auto choose = [this, here_deg, elapsed_s, covariance = with_.identification.covariance(),
+    const auto choose = [this, here_deg, elapsed_s,
+                         covariance = with_.book.identification().covariance(),
                          result = whole_result(), prior = type_prior_] {
         plan::Start start{plan::widened(covariance, configuration_.estimator, result), ""};
         if (prior)
@@ -147,56 +137,36 @@ std::string CampaignDwells::resume_gate() const {
 void CampaignDwells::resume(const std::string& by) {
     planning_.abandon();
     take_type_prior();
-    with_.identification = std::move(interrupted_->identification);
-    with_.identification.reserve(planned_dwells());
-    noise_monitor_.continue_from(std::move(interrupted_->noise));
-    sweeps_ = std::move(interrupted_->sweeps);
-    psds_ = std::move(interrupted_->psds);
-    psd_before_ = std::move(interrupted_->psd_before);
+    with_.book.continue_from(std::move(interrupted_->book), planned_dwells());
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
     interrupted_.reset();
-    auto result = with_.identification.result();
+    auto result = with_.book.identification().result();
     resumed_ = result.dwells.size();
     keep(std::move(result));
 }
 
 void CampaignDwells::end(bool complete) {
     to_write_ = complete ? ToWrite::complete : ToWrite::partial;
-    noise_monitor_.report();
+    with_.book.noise().report();
 }
-
-namespace {
-
-/// As its stage made it while it was measured.
-estimator::spectrum::Sweep sweep_again(const estimator::Settings& settings,
-                                       const journal::DwellCheckpoint& dwell) {
-    estimator::spectrum::ReadSweep sweep(settings, dwell.info.run, dwell.info.position);
-    for (const auto& [time_s, hz] : dwell.stop.swept_hz) sweep.frequency(time_s, hz);
-    for (const auto& measurement : dwell.measurements) sweep.add(measurement);
-    return sweep.finish();
-}
-
-}  // namespace
 
 void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
                                       campaign::Campaign& campaign) {
+    // Somebody looks at the noise when it goes on, though nobody hears of it again.
     Interrupted fresh{
-        estimator::Identification(configuration_.estimator),
-        noise::NoiseMonitor(configuration_.estimator, [](Severity, const std::string&) {}),
+        dwells::DwellBook(configuration_.estimator, [](Severity, const std::string&) {}),
         unfinished.id};
     std::vector<estimator::DwellSummary> done;
-    std::string why = journal::replay(unfinished.dwells,
-                                      {fresh.identification, fresh.noise,
-                                       drivers::from_seconds(configuration_.campaign.dwell_s)});
+    std::string why = journal::replay(unfinished.dwells, fresh.book,
+                                      drivers::from_seconds(configuration_.campaign.dwell_s));
     std::vector<StopDone> stops;
     for (const auto& dwell : unfinished.dwells) {
         done.push_back(dwell.summary);
         if (dwell.stop_known) stops.push_back(dwell.stop);
-        if (dwell.info.sweep.any() && !dwell.summary.left_out)
-            fresh.sweeps.push_back(sweep_again(configuration_.estimator, dwell));
-        if (!dwell.stop.psd.empty()) fresh.psd_before = dwell.stop.psd;
+        auto& spectrum = fresh.book.spectrum();
+        if (!dwell.stop.psd.empty()) spectrum.psd_before = dwell.stop.psd;
         if (dwell.info.played && dwell.info.played->word == estimator::PlayedRandom::Word::good)
-            fresh.psds.push_back(
+            spectrum.psds.push_back(
                 configuration::bands_told(configuration_, dwell.info.random.profile,
                                           dwell.info.random.level_db, dwell.stop.psd));
     }
@@ -218,19 +188,11 @@ void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
     unfinished.dwells.clear();
 }
 
-/// The Identification is this thread's here: no dwell is with the estimator.
-void CampaignDwells::take_noise(estimator::DwellSummary& dwell) {
-    rt::BlockRecord block;
-    while (with_.stage.take_block(block)) noise_monitor_.add(block);
-    noise_monitor_.conclude(dwell, with_.identification);
-}
-
 void CampaignDwells::take_done(campaign::Campaign& campaign) {
     keep_revised(campaign);
     rt::DwellDone done;
-    while (with_.stage.take_done(done)) {
-        if (--with_estimator_ == 0) take_noise(done.summary);
-        auto result = with_.identification.result();
+    while (with_.book.take_done(with_.stage, done)) {
+        auto result = with_.book.identification().result();
         campaign.on_dwell_done(done.summary);
         // Of a random dwell it is not known yet what was played.
         if (!campaign.psd_awaited()) record_dwell(done.summary);
@@ -245,7 +207,7 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     if (!with_.recorder) return;
     // The identification is this thread's: the dwell is over and no other is ordered.
     estimator::Estimate estimate;
-    with_.identification.solved(estimate);
+    with_.book.identification().solved(estimate);
     record::Dwell dwell;
     dwell.time = with_.clock.now();
     dwell.summary = summary;
@@ -253,8 +215,8 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     dwell.value = estimate.value;
     dwell.sigma = estimate.sigma;
     dwell.observable = estimate.observable;
-    dwell.covariance = with_.identification.covariance();
-    const auto& rows = with_.identification.rows();
+    dwell.covariance = with_.book.identification().covariance();
+    const auto& rows = with_.book.identification().rows();
     if (!summary.left_out && !rows.empty() && rows.back().run == summary.run &&
         rows.back().position == summary.position)
         dwell.row = rows.back();
@@ -262,12 +224,13 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
 }
 
 void CampaignDwells::write_out(campaign::Campaign& campaign) {
-    if (written() || with_estimator_ != 0) return;
+    if (written() || !with_.book.free()) return;
     assessing_.abandon();
     keep_revised(campaign);
     write_result(judge(configuration_.estimator, whole_result(), again(),
-                       estimator::uncertainty::Stage::ended, with_.identification.rows(),
-                       configuration::numbered_kinds(configuration_), sweeps_, psds_),
+                       estimator::uncertainty::Stage::ended, with_.book.identification().rows(),
+                       configuration::numbered_kinds(configuration_), with_.book.spectrum().sweeps,
+                       with_.book.spectrum().psds),
                  campaign);
 }
 

@@ -12,7 +12,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/ports.hpp"
 #include "daemon/dwells/anew.hpp"
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/dwells/dwell_book.hpp"
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/aside.hpp"
 #include "daemon/plan/type_prior.hpp"
@@ -37,8 +37,8 @@ class CampaignDwells final : public campaign::Dwells {
         const configuration::Loaded& loaded;
         const drivers::Clock& clock;
         rt::StirredWaiter& control;  ///< woken when something was thought over
-        estimator::Identification& identification;
-        rt::EstimatorStage& stage;
+        dwells::DwellBook& book;
+        rt::EstimatorStage& stage;                          ///< made with the book's identification
         const std::unique_ptr<record::Recorder>& recorder;  ///< null: nothing is recorded
         const std::unique_ptr<journal::Journal>& journal;   ///< made by start(); null: none is kept
         const std::unique_ptr<archive::Outbox>& outbox;     ///< likewise; null: no archive
@@ -54,8 +54,8 @@ class CampaignDwells final : public campaign::Dwells {
     void swept(const estimator::spectrum::Sweep& sweep,
                const std::vector<std::array<double, 2>>& readings) override;
     [[nodiscard]] campaign::Played played(const campaign::ToldPsd& told) override;
-    [[nodiscard]] bool free() const override { return with_estimator_ == 0 && written(); }
-    void levelled(const LevelDrift& drift) override { noise_monitor_.levelled(drift); }
+    [[nodiscard]] bool free() const override { return with_.book.free() && written(); }
+    void levelled(const LevelDrift& drift) override { with_.book.levelled(drift); }
     [[nodiscard]] std::optional<campaign::Next> next(const std::array<double, 3>& here_deg,
                                                      double elapsed_s) override;
     [[nodiscard]] std::string resume_gate() const override;
@@ -80,7 +80,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] bool written() const { return to_write_ == ToWrite::nothing; }
     /// The campaign has ended, and its last verdict is being thought over.
     [[nodiscard]] bool concluding() const { return concluding_ && to_write_ == ToWrite::complete; }
-    [[nodiscard]] NoiseStatus noise() const { return noise_monitor_.status(); }
+    [[nodiscard]] NoiseStatus noise() const { return with_.book.noise().status(); }
 
     // Any thread.
     [[nodiscard]] estimator::Result result() const;  ///< without its rows
@@ -112,7 +112,6 @@ class CampaignDwells final : public campaign::Dwells {
         const std::optional<Again>& again, estimator::uncertainty::Stage stage);
     [[nodiscard]] std::size_t planned_dwells() const;
     [[nodiscard]] bool verdict_wanted();
-    void take_noise(estimator::DwellSummary& dwell);
     void record_dwell(const estimator::DwellSummary& summary);
     [[nodiscard]] std::string take_psd(const campaign::ToldPsd& told,
                                        estimator::PlayedRandom& played);
@@ -132,20 +131,12 @@ class CampaignDwells final : public campaign::Dwells {
 
     const With with_;
     const configuration::Configuration& configuration_;
-    noise::NoiseMonitor noise_monitor_;
-    /// As they were when the campaign was interrupted; until it is resumed.
+    /// As it was when the campaign was interrupted; until it is resumed.
     struct Interrupted {
-        estimator::Identification identification;
-        noise::NoiseMonitor noise;
+        dwells::DwellBook book;
         std::int64_t id = 0;
-        std::vector<estimator::spectrum::Sweep> sweeps{};
-        tool::PlayedBands psds{};
-        std::vector<std::array<double, 2>> psd_before{};
     };
     std::optional<Interrupted> interrupted_;
-    std::vector<estimator::spectrum::Sweep> sweeps_;  ///< of the campaign so far
-    tool::PlayedBands psds_;                          ///< of its random dwells, at the platform
-    std::vector<std::array<double, 2>> psd_before_;   ///< as it came after the newest of them
     bool revised_ = false;    ///< a dwell is another one than the result kept has
     rt::DwellOrder ordered_;  ///< the newest
     std::optional<std::size_t> resumed_;
@@ -155,7 +146,6 @@ class CampaignDwells final : public campaign::Dwells {
     plan::Aside<plan::AdaptivePlan::Decision> planning_{[this] { with_.control.notify(); }};
     /// Tens of milliseconds, with hundreds of dwells seconds.
     plan::Aside<Judged> assessing_{[this] { with_.control.notify(); }};
-    int with_estimator_ = 0;    ///< ordered, not yet reported done
     bool verdict_due_ = false;  ///< on the dwells so far
     bool concluding_ = false;   ///< the last verdict is asked for
     std::string verdict_told_, against_certificate_;

@@ -24,8 +24,8 @@ campaign::Played CampaignDwells::played(const campaign::ToldPsd& told) {
                                          ? "is refused"
                                          : "was not read, its profile's stands in its place",
                                      why));
-    if (!told.pairs.empty()) psd_before_ = told.pairs;
-    out.summary = with_.identification.played(out.random);
+    if (!told.pairs.empty()) with_.book.spectrum().psd_before = told.pairs;
+    with_.book.played(out.random, out.summary);
     revised_ = true;
     if (with_.recorder)
         with_.recorder->played({ordered_.from, dwell.run, dwell.position, out.random, told.pairs});
@@ -46,7 +46,7 @@ std::string CampaignDwells::take_psd(const campaign::ToldPsd& told,
     const auto taken = spectrum::take_controller_psd(
         told.pairs,
         {*nominal, told.measured_g_rms, drivers::to_seconds(ordered_.to - ordered_.from),
-         configuration_.spectrum.controller_gain, psd_before_});
+         configuration_.spectrum.controller_gain, with_.book.spectrum().psd_before});
     if (!taken.wrong.empty()) return taken.wrong;
     auto there = configuration::at_platform(configuration_, taken.psd);
     if (!there)
@@ -58,16 +58,17 @@ std::string CampaignDwells::take_psd(const campaign::ToldPsd& told,
     played.random.profile = asked.profile;
     played.random.level_db = asked.level_db;
     played.seen = there->seen;
-    psds_.push_back(std::move(there->bands));
-    played.place = static_cast<std::uint32_t>(psds_.size());
+    auto& psds = with_.book.spectrum().psds;
+    psds.push_back(std::move(there->bands));
+    played.place = static_cast<std::uint32_t>(psds.size());
     return {};
 }
 
 /// What was played has come after the result of its dwell.
 void CampaignDwells::keep_revised(campaign::Campaign& campaign) {
-    if (!revised_ || with_estimator_ != 0) return;
+    if (!revised_ || !with_.book.free()) return;
     revised_ = false;
-    auto result = with_.identification.result();
+    auto result = with_.book.identification().result();
     campaign.qualify(result);
     keep(std::move(result));
     verdict_due_ = true;

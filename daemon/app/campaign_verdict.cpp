@@ -52,12 +52,12 @@ Severity CampaignDwells::severity_of(uncertainty::Level level) {
 bool CampaignDwells::verdict_wanted() {
     if (to_write_ != ToWrite::nothing) return !std::exchange(concluding_, true);
     if (!std::exchange(verdict_due_, false)) return false;
-    const std::size_t dwells = with_.identification.rows().size();
+    const std::size_t dwells = with_.book.identification().rows().size();
     return dwells <= kEveryDwell || dwells % kAmongMany == 0;
 }
 
 std::optional<CampaignDwells::Again> CampaignDwells::again() const {
-    const auto found = noise_monitor_.found();
+    const auto found = with_.book.noise().found();
     if (!found) return {};
     return Again{*found, with_.journal ? with_.journal->status().path : std::string(),
                  journal::configuration_hash(result_configuration(with_.loaded))};
@@ -76,17 +76,12 @@ std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
         out.not_anew =
             again->journal.empty()
                 ? "no journal is kept"
-                : journal::reread(
-                      again->journal, again->configuration_hash, result.dwells.back(),
-                      [&](const journal::DwellCheckpoint& dwell) {
-                          if (dwell.measurements.empty()) return;
-                          identification.begin_dwell(dwell.info);
-                          for (const auto& m : dwell.measurements)
-                              static_cast<void>(identification.add(m));
-                          static_cast<void>(identification.end_dwell());
-                          if (dwell.info.played)
-                              static_cast<void>(identification.played(*dwell.info.played));
-                      });
+                : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
+                                  [&](const journal::DwellCheckpoint& dwell) {
+                                      dwells::feed(
+                                          identification, dwell.info, dwell.measurements, false,
+                                          [](std::size_t, const estimator::StepResult&) {});
+                                  });
         auto found = anew.result();
         if (out.not_anew.empty() && found.dwells.size() != result.dwells.size())
             out.not_anew = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
@@ -94,8 +89,7 @@ std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
         if (out.not_anew.empty()) {
             out.live = std::make_shared<const dwells::Live>(
                 dwells::Live{again->found, result, uncertainty::assess(settings, result)});
-            out.assessed =
-                uncertainty::assess(dwells::Anew::settings_of(settings, again->found), found);
+            out.assessed = dwells::assess(settings, again->found, found);
             out.anew = std::move(found);
             return identification.rows();
         }
@@ -149,21 +143,22 @@ void CampaignDwells::keep(estimator::Result result) {
 /// While no dwell is with the estimator. Only this thread changes result_.
 estimator::Result CampaignDwells::whole_result() const {
     auto result = result_;
-    result.rows = estimator::without_apart(with_.identification.rows());
+    result.rows = estimator::without_apart(with_.book.identification().rows());
     return result;
 }
 
 void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
-    if (with_estimator_ != 0) return;
+    if (!with_.book.free()) return;
     std::optional<Judged> judged;
     if (verdict_wanted()) {
+        const auto& spectrum = with_.book.spectrum();
         // In a thread of its own also where one may wait: what it has of memory, more with each
         // dwell, is in nobody's way.
         const auto work = [settings = configuration_.estimator, result = whole_result(),
-                           rows = with_.identification.rows(),
+                           rows = with_.book.identification().rows(),
                            profiles = configuration::numbered_kinds(configuration_),
-                           sweeps = concluding_ ? sweeps_ : decltype(sweeps_){},
-                           psds = concluding_ ? psds_ : decltype(psds_){},
+                           sweeps = concluding_ ? spectrum.sweeps : decltype(spectrum.sweeps){},
+                           psds = concluding_ ? spectrum.psds : decltype(spectrum.psds){},
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,

@@ -141,8 +141,11 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
       control_waiter(std::make_unique<rt::StirredWaiter>(clock.make_waiter())),
       estimator_waiter(clock.make_waiter()),
       interlock(*shaker, *control_waiter, interlock_limits(configuration, dbc)),
-      identification(configuration.estimator),
-      estimator_stage(estimator_ring, *estimator_waiter, *control_waiter, identification),
+      book(configuration.estimator,
+           [this](Severity severity, const std::string& text) {
+               events.log(severity, "noise", text);
+           }),
+      estimator_stage(estimator_ring, *estimator_waiter, *control_waiter, book.identification()),
       recorder(make_recorder(*this)),
       sent_tap(recorder ? std::make_unique<record::SentTap>(*port, clock, recorder->sent())
                         : nullptr),
@@ -155,8 +158,8 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
       gimbal(dbc, configuration.gimbal, sending_port()),
       torquer(make_torquer(*this)),
       rig(gimbal, *shaker, acquisition, rest, fitness, interlock, events),
-      dwells({loaded, clock, *control_waiter, identification, estimator_stage, recorder, journal,
-              outbox, fitness, events, rig_clock != nullptr, memory_lock.locked}),
+      dwells({loaded, clock, *control_waiter, book, estimator_stage, recorder, journal, outbox,
+              fitness, events, rig_clock != nullptr, memory_lock.locked}),
       campaign_log(events, journal),
       campaign(configuration.campaign,
                {with_stages(rig, torquer.get(), stage_feed), dwells, campaign_log}) {

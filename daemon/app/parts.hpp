@@ -73,7 +73,7 @@ struct Parts {
 
     // Samples go from the acquisition to the estimator and into the files.
     rt::Ring<drivers::Sample> estimator_ring{4096};
-    estimator::Identification identification;
+    dwells::DwellBook book;
     rt::EstimatorStage estimator_stage;
     std::unique_ptr<journal::Journal> journal;  ///< start() makes it; null: none is kept
     std::unique_ptr<archive::Outbox> outbox;    ///< likewise; null: no archive

@@ -41,6 +41,12 @@ estimator::Settings Anew::settings_of(estimator::Settings settings,
     return settings;
 }
 
+estimator::uncertainty::Assessment assess(const estimator::Settings& settings,
+                                          const std::optional<noise::Found>& found,
+                                          const estimator::Result& result) {
+    return estimator::uncertainty::assess(Anew::settings_of(settings, found), result);
+}
+
 std::string noise_in_json(const noise::Found& found) {
     const auto& levels = found.levels;
     nlohmann::ordered_json noise{

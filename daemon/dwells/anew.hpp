@@ -1,13 +1,31 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <ranges>
 #include <string>
 
 #include "daemon/noise/noise_monitor.hpp"
+#include "estimator/identification/identification.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::dwells {
+
+/// One dwell into a filter with the noise in force, what was played in it included: measurement by
+/// measurement, `each(n, step)` hears of them. As live the filter never hears of a dwell without
+/// any.
+template <std::ranges::input_range Measurements, typename Each>
+void feed(estimator::Identification& identification, const estimator::DwellInfo& dwell,
+          const Measurements& measurements, bool cut_short, const Each& each) {
+    if (std::ranges::empty(measurements)) return;
+    identification.begin_dwell(dwell);
+    std::size_t n = 0;
+    for (const estimator::Measurement& measurement : measurements)
+        each(n++, identification.add(measurement));
+    static_cast<void>(identification.end_dwell(cut_short));
+    if (dwell.played) static_cast<void>(identification.played(*dwell.played));
+}
 
 /// A campaign identified once more from its recorded dwells, all of them with the noise that the
 /// whole of it was found to have. Live, resumed and replayed it is fed alike, to the last bit.
@@ -29,6 +47,11 @@ class Anew {
     estimator::Identification identification_;
     std::string words_;
 };
+
+/// What can be believed of a result, identified anew where noise was found.
+[[nodiscard]] estimator::uncertainty::Assessment assess(const estimator::Settings& settings,
+                                                        const std::optional<noise::Found>& found,
+                                                        const estimator::Result& result);
 
 /// What was shown before a campaign was identified anew.
 struct Live {

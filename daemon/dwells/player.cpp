@@ -4,13 +4,11 @@
 
 namespace vibrig::dwells {
 
-Player::Player(const estimator::Settings& settings)
-    : identification_(settings),
-      stage_(ring_, awake_, awake_, identification_),
-      noise_(settings, nullptr) {}
+Player::Player(const estimator::Settings& settings, DwellBook::Noise noise)
+    : book_(settings, nullptr, noise), stage_(ring_, awake_, awake_, book_.identification()) {}
 
 void Player::order(const rt::DwellOrder& order) {
-    if (!stage_.order(order)) throw std::runtime_error("the estimator takes no order");
+    if (!book_.order(stage_, order)) throw std::runtime_error("the estimator takes no order");
     stage_.work();
 }
 
@@ -20,14 +18,6 @@ void Player::push(std::span<const drivers::Sample> samples) {
     if (ring_.push_n(samples) != samples.size())
         throw std::runtime_error("the estimator's ring is full");
     stage_.work();
-}
-
-bool Player::take_done(rt::DwellDone& done, bool decide) {
-    if (!stage_.take_done(done)) return false;
-    rt::BlockRecord block;
-    while (stage_.take_block(block)) noise_.add(block);
-    if (decide) noise_.conclude(done.summary, identification_);
-    return true;
 }
 
 }  // namespace vibrig::dwells

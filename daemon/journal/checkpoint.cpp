@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "daemon/dwells/dwell_book.hpp"
+
 namespace vibrig::journal {
 
 namespace {
@@ -335,41 +337,18 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     return {};
 }
 
-std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to) {
-    rt::Ring<rt::BlockRecord> blocks{256};
-    rt::AngleBlocks averager(blocks);
+std::string replay(std::vector<DwellCheckpoint>& dwells, dwells::DwellBook& book,
+                   drivers::Time dwell_length) {
     for (auto& dwell : dwells) {
-        const auto& noise = to.identification.noise();
+        const auto& noise = book.identification().noise();
         const std::string where =
             fmt::format("run {} position {}", dwell.info.run, dwell.info.position);
         if (dwell.noise_known && bytes_of(noise) != bytes_of(dwell.summary.noise)) {
             return fmt::format("{} was filtered with {}, found {} again", where,
                                words(dwell.summary.noise), words(noise));
         }
-        estimator::DwellSummary summary = dwell.summary;
-        if (dwell.measurements.empty()) {  // the filter never heard of it
-            summary.reason = "no samples";
-            summary.left_out = true;
-        } else {
-            to.identification.begin_dwell(dwell.info);
-            rt::DwellOrder order;
-            order.to = to.dwell;
-            order.dwell = dwell.info;
-            averager.begin(order);
-            for (const auto& measurement : dwell.measurements) {
-                const auto step = to.identification.add(measurement);
-                if (step.outcome == estimator::StepOutcome::used)
-                    averager.add(measurement.time_s, measurement.angle_rad);
-            }
-            summary = to.identification.end_dwell();
-            averager.end();
-            blocks.consume([&to](const rt::BlockRecord& block) { to.noise.add(block); }, 256);
-        }
-        to.noise.conclude(summary, to.identification);
-        if (dwell.info.played) {
-            const auto known = to.identification.played(*dwell.info.played);
-            if (known.samples > 0) summary = known;
-        }
+        const auto summary =
+            book.take_again({dwell.info, dwell_length, dwell.measurements, dwell.stop.swept_hz});
         // An earlier program kept left out as flagged; what is left out has no sample in use.
         if (dwell.summary.flagged) dwell.summary.left_out = summary.left_out;
         if (numbers_of(summary) != numbers_of(dwell.summary))

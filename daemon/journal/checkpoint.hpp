@@ -5,9 +5,13 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/domain/positions.hpp"
 #include "drivers/base/clock.hpp"
 #include "estimator/identification/identification.hpp"
+
+namespace vibrig::dwells {
+class DwellBook;
+}
 
 namespace vibrig::journal {
 
@@ -34,14 +38,10 @@ inline constexpr std::uint32_t kCheckpointVersion = 9;
 [[nodiscard]] std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
                                  DwellCheckpoint& dwell);
 
-/// A fresh identification and its noise monitor, to be fed again.
-struct Replay {
-    estimator::Identification& identification;
-    noise::NoiseMonitor& noise;
-    drivers::Time dwell = 0;  ///< length of a dwell as it was ordered
-};
-/// Feeds the dwells. Empty if every summary came out as it was to the last bit, filtered with the
-/// noise levels it was; else which did not. Summaries get their reasons back.
-[[nodiscard]] std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to);
+/// Enters the dwells, which were ordered with this length, in a fresh book. Empty if every summary
+/// came out as it was to the last bit, filtered with the noise levels it was; else which did not.
+/// Summaries get their reasons back.
+[[nodiscard]] std::string replay(std::vector<DwellCheckpoint>& dwells, dwells::DwellBook& book,
+                                 drivers::Time dwell_length);
 
 }  // namespace vibrig::journal

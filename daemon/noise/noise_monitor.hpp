@@ -14,6 +14,7 @@
 #include "daemon/rt/angle_blocks.hpp"
 #include "estimator/allan/dwell_monitor.hpp"
 #include "estimator/identification/dwell_residual.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::noise {
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <stdexcept>
 #include <thread>
@@ -19,15 +20,6 @@ namespace vibrig::record {
 using drivers::Time;
 
 namespace {
-
-/// Those in force again would move a last bit: the filter keeps their squares.
-void set_noise(estimator::Identification& identification, const estimator::NoiseLevels& levels) {
-    const auto& now = identification.noise();
-    if (levels.angle_arcsec > 0 &&
-        (levels.angle_arcsec != now.angle_arcsec ||
-         levels.gyro_random_walk_deg_per_rt_h != now.gyro_random_walk_deg_per_rt_h))
-        identification.set_noise(levels);
-}
 
 void take_estimate(const estimator::Identification& identification, Dwell& to) {
     estimator::Estimate estimate;
@@ -42,28 +34,25 @@ void take_estimate(const estimator::Identification& identification, Dwell& to) {
 void feed_as_it_is(estimator::Identification& identification, const Campaign& campaign,
                    const RecordedDwell& dwell, const OnStep& on_step) {
     const Order& order = *dwell.order;
-    identification.begin_dwell(order.dwell());
-    for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
-        const auto step =
-            identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
-        if (on_step) on_step(i, step);
-    }
-    static_cast<void>(identification.end_dwell(dwell.cut_short));
-    if (order.played) static_cast<void>(identification.played(*order.played));
+    const auto measurements = std::span(campaign.samples).subspan(dwell.first, dwell.count) |
+                              std::views::transform([&order](const drivers::Sample& sample) {
+                                  return rt::measurement_of(sample, order.from, order.zero_g);
+                              });
+    dwells::feed(identification, order.dwell(), measurements, dwell.cut_short,
+                 [&](std::size_t n, const estimator::StepResult& step) {
+                     if (on_step) on_step(dwell.first + n, step);
+                 });
 }
 
 /// One finished dwell as a recording has it, if there is one; `order`: the newest.
-bool take_done(dwells::Player& player, Dwell& dwell, bool decide, const Order* order) {
+bool take_done(dwells::Player& player, Dwell& dwell, const Order* order) {
     rt::DwellDone done;
-    if (!player.take_done(done, decide)) return false;
+    if (!player.take_done(done)) return false;
     dwell.time = player.now();
-    if (order != nullptr && order->played) {
-        const auto known = player.identification().played(*order->played);
-        if (known.samples > 0) done.summary = known;
-    }
+    if (order != nullptr && order->played) player.book().played(*order->played, done.summary);
     dwell.summary = done.summary;
     dwell.reason = done.summary.reason;
-    take_estimate(player.identification(), dwell);
+    take_estimate(player.book().identification(), dwell);
     return true;
 }
 
@@ -143,7 +132,7 @@ void forget_noise(Campaign& campaign) {
 
 void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step) {
-    set_noise(identification, campaign.found ? campaign.found->levels : dwell.order->noise);
+    dwells::use_noise(identification, campaign.found ? campaign.found->levels : dwell.order->noise);
     feed_as_it_is(identification, campaign, dwell, on_step);
 }
 
@@ -160,7 +149,7 @@ estimator::Result live_result(const Campaign& campaign, const estimator::Setting
     const auto dwells = recorded_dwells(campaign);
     estimator::Identification identification(settings, dwells.size());
     for (const RecordedDwell& dwell : dwells) {
-        set_noise(identification, dwell.order->noise);
+        dwells::use_noise(identification, dwell.order->noise);
         feed_as_it_is(identification, campaign, dwell, {});
     }
     return identification.result();
@@ -175,7 +164,9 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     out.samples = samples.size();
     if (!samples.empty())
         out.recorded_s = drivers::to_seconds(samples.back().time - samples.front().time);
-    dwells::Player player(settings);
+    const bool decide = !noise_known(campaign);
+    using Noise = dwells::DwellBook::Noise;
+    dwells::Player player(settings, decide ? Noise::decided : Noise::given);
     std::size_t at = 0;
     const auto play_until = [&](std::size_t end) {
         while (at < end) {
@@ -195,10 +186,9 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
             if (options.progress) options.progress(at, samples.size());
         }
     };
-    const bool decide = !noise_known(campaign);
     const Order* newest = nullptr;
     const auto take = [&] {
-        for (Dwell dwell; take_done(player, dwell, decide, newest);) {
+        for (Dwell dwell; take_done(player, dwell, newest);) {
             if (out.dwells.size() < campaign.dwells.size()) {
                 ++out.compared;
                 const Dwell& was = campaign.dwells[out.dwells.size()];
@@ -217,7 +207,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     for (const RecordedDwell& dwell : recorded_dwells(campaign)) {
         play_until(std::max(at, dwell.first));
         newest = dwell.order;
-        set_noise(player.identification(), dwell.order->noise);
+        player.book().use_noise(dwell.order->noise);
         rt::DwellOrder order;
         order.from = dwell.order->from;
         order.to = dwell.order->to;
@@ -237,9 +227,9 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     }
     play_until(samples.size());
     take();
-    out.result = player.identification().result();
+    out.result = player.book().identification().result();
     qualify(campaign, out);
-    out.found = decide ? player.noise_found() : campaign.found;
+    out.found = decide ? player.book().noise().found() : campaign.found;
     if (out.found) {
         const dwells::Anew again = anew(campaign, settings, *out.found);
         out.live = std::exchange(out.result, again.result());

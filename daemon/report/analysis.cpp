@@ -286,8 +286,7 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
     out.coefficients = final_coefficients(campaign.path, out.replayed);
-    out.assessed = estimator::uncertainty::assess(
-        dwells::Anew::settings_of(settings, out.replayed.found), out.replayed.result);
+    out.assessed = dwells::assess(settings, out.replayed.found, out.replayed.result);
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <numbers>
 
-#include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/ring.hpp"
-#include "drivers/sample/sample.hpp"
+#include "drivers/base/clock.hpp"
+#include "estimator/filter/measurement.hpp"
 
 namespace vibrig::rt {
 
@@ -31,12 +31,12 @@ class AngleBlocks {
   public:
     explicit AngleBlocks(Ring<BlockRecord>& to) : to_(to) {}
 
-    void begin(const DwellOrder& order) noexcept {
+    /// `length`: of the dwell as it was ordered.
+    void begin(const estimator::DwellInfo& dwell, drivers::Time length) noexcept {
         open_ = {};
-        open_.dwell = order.dwell;
+        open_.dwell = dwell;
         constexpr double kBlocks = 100, kShortest_s = 1, kLongest_s = 60;
-        open_.block_s = std::clamp(drivers::to_seconds(order.to - order.from) / kBlocks,
-                                   kShortest_s, kLongest_s);
+        open_.block_s = std::clamp(drivers::to_seconds(length) / kBlocks, kShortest_s, kLongest_s);
     }
 
     void add(double time_s, const std::array<double, 3>& angle_rad) noexcept {

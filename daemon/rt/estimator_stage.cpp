@@ -11,7 +11,11 @@ constexpr Time kPublishPeriod = 200 * drivers::kMillisecond;
 
 EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& self,
                                drivers::Waiter& control, estimator::Identification& identification)
-    : samples_(samples), self_(self), control_(control), identification_(identification) {}
+    : samples_(samples),
+      self_(self),
+      control_(control),
+      identification_(identification),
+      feed_(identification, blocks_) {}
 
 void EstimatorStage::run() noexcept {
     while (!stop_.load()) {
@@ -19,7 +23,7 @@ void EstimatorStage::run() noexcept {
         if (stays_) follow();
         self_.wait_until(drivers::kNever);
     }
-    if (begun_) finish(true);
+    if (feed_.begun()) finish(true);
 }
 
 void EstimatorStage::work() noexcept {
@@ -28,7 +32,7 @@ void EstimatorStage::work() noexcept {
     while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
     }
     if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
-    if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
+    if (shown_.sample_time - published_at_ >= kPublishPeriod) publish(feed_.begun());
 }
 
 void EstimatorStage::follow() noexcept {
@@ -80,16 +84,10 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
         return;
     }
     ++shown_.in_dwell;
-    const bool first = !begun_;
-    if (first) {
-        identification_.begin_dwell(current_.dwell);
-        averager_.begin(current_);
-        begun_ = true;
-    }
+    const bool first = !feed_.begun();
+    if (first) feed_.begin(current_.dwell, current_.to - current_.from);
     const auto measurement = measurement_of(sample, current_.from, current_.zero_g);
-    if (identification_.add(measurement).outcome == estimator::StepOutcome::used) {
-        averager_.add(measurement.time_s, measurement.angle_rad);
-    }
+    feed_.add(measurement);
     if (journal_ != nullptr)
         journal_->try_push({measurement, current_.dwell.run, current_.dwell.position, first, 0});
     shown_.dwell_fraction = static_cast<double>(sample.time - current_.from) /
@@ -97,29 +95,20 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
 }
 
 void EstimatorStage::finish(bool cut_short) noexcept {
-    DwellDone done;
     shown_.dwell_fraction = 0;
-    if (begun_) {
-        done.summary = identification_.end_dwell(cut_short);
-        averager_.end();
-        publish();
-    } else {
-        done.summary.run = current_.dwell.run;
-        done.summary.position = current_.dwell.position;
-        done.summary.flagged = done.summary.left_out = true;
-        done.summary.reason = "no samples";
-        done.summary.noise = identification_.noise();
-    }
+    const bool begun = feed_.begun();
+    DwellDone done;
+    done.summary = begun ? feed_.end(cut_short) : feed_.none_of(current_.dwell);
+    if (begun) publish(true);
     ordered_ = false;
-    begun_ = false;
     // From here on the Identification is the control thread's.
     done_.try_push(done);
     control_.notify();
 }
 
-void EstimatorStage::publish() noexcept {
-    // Outside a dwell the Identification may be in the control thread's hands.
-    if (begun_) identification_.estimate(shown_.estimate);
+/// `ours`: in a dwell; outside the Identification may be in the control thread's hands.
+void EstimatorStage::publish(bool ours) noexcept {
+    if (ours) identification_.estimate(shown_.estimate);
     published_at_ = shown_.sample_time;
     shown_.faults = page_faults_of_this_thread();
     view_.publish(shown_);

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "daemon/rt/angle_blocks.hpp"
+#include "daemon/rt/dwell_feed.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/real_time.hpp"
@@ -65,7 +65,7 @@ class EstimatorStage {
     void take_order(const DwellOrder& order) noexcept;
     void take_sample(const drivers::Sample& sample) noexcept;
     void finish(bool cut_short) noexcept;
-    void publish() noexcept;
+    void publish(bool ours) noexcept;
     void follow() noexcept;
 
     Ring<drivers::Sample>& samples_;
@@ -80,12 +80,11 @@ class EstimatorStage {
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};
     Ring<BlockRecord> blocks_{256};
-    AngleBlocks averager_{blocks_};
+    DwellFeed feed_;
     std::atomic<bool> stop_{false};
 
     DwellOrder current_;
     bool ordered_ = false;
-    bool begun_ = false;
     drivers::Time published_at_ = 0;
     EstimatorView shown_;
     Snapshot<EstimatorView> view_;

@@ -114,8 +114,8 @@ class Bench {
     /// `found`: the noise that all of it was found to have, in place of the configured one.
     Bench(const estimator::Settings& settings, const plant::CampaignPlan& plan,
           const std::optional<noise::Found>& found)
-        : plan_(plan), player_(settings), decide_(!found) {
-        if (found) player_.identification().set_noise(found->levels);
+        : plan_(plan), player_(settings, found ? Noise::given : Noise::decided) {
+        if (found) player_.book().use_noise(found->levels);
         samples_.reserve(dwells::Player::kMost);
     }
 
@@ -140,13 +140,15 @@ class Bench {
         cancel.cancel = true;
         player_.order(cancel);
         rt::DwellDone done;
-        while (player_.take_done(done, decide_)) {
+        while (player_.take_done(done)) {
         }
         begun_ = false;
     }
 
-    [[nodiscard]] std::optional<noise::Found> noise_found() const { return player_.noise_found(); }
-    [[nodiscard]] estimator::Result result() { return player_.identification().result(); }
+    [[nodiscard]] std::optional<noise::Found> noise_found() const {
+        return player_.book().noise().found();
+    }
+    [[nodiscard]] estimator::Result result() { return player_.book().identification().result(); }
     /// Mean over the samples: what an identification of a rig that drifts is to be judged by.
     [[nodiscard]] double truth(std::size_t i) const {
         return truth_[i] / static_cast<double>(count_);
@@ -154,6 +156,7 @@ class Bench {
     [[nodiscard]] double hours() const { return drivers::to_seconds(player_.now()) / 3600; }
 
   private:
+    using Noise = dwells::DwellBook::Noise;
     void begin(drivers::Time time, const plant::PlannedSample& from) {
         rt::DwellOrder order;
         order.from = time;
@@ -170,7 +173,6 @@ class Bench {
 
     const plant::CampaignPlan& plan_;
     dwells::Player player_;
-    const bool decide_;
     std::vector<drivers::Sample> samples_;
     std::array<double, estimator::kParameters> truth_{};
     std::uint64_t count_ = 0;
@@ -192,7 +194,7 @@ CampaignRecord campaign(const estimator::Settings& settings, const plant::Campai
     if (found) playing = played(found);
     Bench& bench = *playing;
     const auto result = bench.result();
-    const auto assessed = uncertainty::assess(dwells::Anew::settings_of(settings, found), result);
+    const auto assessed = dwells::assess(settings, found, result);
     CampaignRecord record;
     record.hours = bench.hours();
     record.verdict = static_cast<std::uint8_t>(assessed.verdict.level);

@@ -71,7 +71,7 @@ std::vector<std::string> dwell_warnings(const std::vector<DwellSummary>& dwells)
                     " samples rejected)";
             warnings.push_back(std::move(text));
         }
-        if (d.used < 2) continue;
+        if (d.used < 2 || d.nis_per_dof <= 0) continue;  // a sweep is not the filter's
         // 99.9 % band of a mean of chi-squares, where the dwell is too short for 10 %.
         const double band = std::max(0.1, 3.29 * std::sqrt(2.0 / (3.0 * d.used)));
         if (std::abs(d.nis_per_dof - 1.0) > band) {

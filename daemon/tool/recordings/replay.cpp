@@ -145,8 +145,7 @@ int replay(const ReplayArguments& arguments) {
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
                             campaign.head.instruction_set == estimator::instruction_set();
-    const auto assessed = estimator::uncertainty::assess(
-        dwells::Anew::settings_of(settings, replayed.found), replayed.result);
+    const auto assessed = dwells::assess(settings, replayed.found, replayed.result);
     const bool simulated = campaign.head.simulated;
     if (!arguments.plot.empty()) report::plot_result(arguments.plot, replayed.result, assessed);
     std::cout << (arguments.json

@@ -309,10 +309,8 @@ int compensate(const CompensateArguments& arguments) {
     report::Coefficients coefficients;
     estimator::Settings settings = report_settings(campaign, arguments.config);
     const auto replayed = record::replay(campaign, settings, {});
-    coefficients =
-        report::combined(estimator::uncertainty::assess(
-                             dwells::Anew::settings_of(settings, replayed.found), replayed.result),
-                         report::final_coefficients(campaign.path, replayed));
+    coefficients = report::combined(dwells::assess(settings, replayed.found, replayed.result),
+                                    report::final_coefficients(campaign.path, replayed));
     check_finite(campaign.path, coefficients);
     if (arguments.table_g) level *= settings.transmission;
     const double kappa = 1 + level * level / 2;

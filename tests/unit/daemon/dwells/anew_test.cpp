@@ -87,12 +87,12 @@ Campaign simulated(const estimator::Settings& settings, double walk, std::uint64
             cancel.cancel = true;
             player.order(cancel);
             rt::DwellDone done;
-            while (player.take_done(done, true)) {
+            while (player.take_done(done)) {
             }
         });
     for (double& value : out.truth) value /= static_cast<double>(count);
-    out.live = player.identification().result();
-    out.found = player.noise_found();
+    out.live = player.book().identification().result();
+    out.found = player.book().noise().found();
     return out;
 }
 

@@ -11,11 +11,13 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <thread>
 
+#include "daemon/dwells/dwell_book.hpp"
 #include "daemon/journal/database.hpp"
 #include "daemon/journal/verify.hpp"
 #include "estimator/identification/result.hpp"
@@ -29,15 +31,14 @@ using testing::SizeIs;
 
 constexpr std::uint64_t kHash = 0x1234;
 
-/// A filter and its noise monitor, as between two dwells of the daemon.
-struct Estimating {
-    estimator::Identification filter{estimator::Settings{}};
-    noise::NoiseMonitor noise{estimator::Settings{}, [](Severity, const std::string&) {}};
+dwells::DwellBook fresh_book() {
+    return dwells::DwellBook(estimator::Settings{}, [](Severity, const std::string&) {});
+}
 
-    [[nodiscard]] Replay again(double dwell_s) {
-        return {filter, noise, drivers::from_seconds(dwell_s)};
-    }
-};
+std::string replayed(std::vector<DwellCheckpoint>& dwells, double dwell_s) {
+    auto book = fresh_book();
+    return replay(dwells, book, drivers::from_seconds(dwell_s));
+}
 
 /// A folder of its own, gone afterwards.
 struct JournalTest : testing::Test {
@@ -116,9 +117,9 @@ TEST_F(JournalTest, GivesBackTheFilterToTheLastBit) {
     auto& campaign = *journal.recovery().campaign;
     EXPECT_EQ(campaign.started_by, "Ada");
     ASSERT_THAT(campaign.dwells, SizeIs(2));
-    Estimating fresh;
-    EXPECT_EQ(replay(campaign.dwells, fresh.again(20)), "");
-    auto& again = fresh.filter;
+    auto fresh = fresh_book();
+    EXPECT_EQ(replay(campaign.dwells, fresh, 20 * drivers::kSecond), "");
+    auto& again = fresh.identification();
     // THEN both say the same to the last bit, now and after one more position
     for (int p = 3; p <= 4; ++p) {
         const auto left = filter.result(), right = again.result();
@@ -344,12 +345,35 @@ TEST_F(JournalTest, TakesNoCheckpointThatDoesNotComeOutAsItDid) {
     estimator::Identification filter{estimator::Settings{}};
     std::vector<DwellCheckpoint> dwells{dwell(filter, 1)};
     dwells[0].measurements[100].angle_rad[0] += 1e-6;
-    EXPECT_EQ(replay(dwells, Estimating().again(20)),
-              "run 1 position 1 does not come out as it did");
+    EXPECT_EQ(replayed(dwells, 20), "run 1 position 1 does not come out as it did");
 }
 
-/// Dwells as the daemon does them, the platform's gyros `walk` deg/sqrt(h) noisy.
-std::vector<DwellCheckpoint> noisy_dwells(Estimating& at, int dwells, double walk, int first = 1) {
+/// The steps of a dwell's end, written anew.
+struct Estimating {
+    estimator::Identification filter{estimator::Settings{}};
+    noise::NoiseMonitor noise{estimator::Settings{}, [](Severity, const std::string&) {}};
+
+    estimator::DwellSummary operator()(const DwellCheckpoint& checkpoint) {
+        rt::Ring<rt::BlockRecord> blocks{256};
+        rt::AngleBlocks averager(blocks);
+        averager.begin(checkpoint.info, 40 * drivers::kSecond);
+        filter.begin_dwell(checkpoint.info);
+        for (const auto& m : checkpoint.measurements) {
+            if (filter.add(m).outcome == estimator::StepOutcome::used)
+                averager.add(m.time_s, m.angle_rad);
+        }
+        auto summary = filter.end_dwell();
+        averager.end();
+        blocks.consume([&](const rt::BlockRecord& block) { noise.add(block); }, 256);
+        noise.conclude(summary, filter);
+        return summary;
+    }
+};
+
+/// Dwells that `take` comes to a summary of, the platform's gyros `walk` deg/sqrt(h) noisy.
+std::vector<DwellCheckpoint> noisy_dwells(
+    const std::function<estimator::DwellSummary(const DwellCheckpoint&)>& take, int dwells,
+    double walk, int first = 1) {
     constexpr double kArcsec = std::numbers::pi / 180 / 3600;
     std::mt19937_64 generator(911);
     std::normal_distribution<double> normal;
@@ -369,18 +393,7 @@ std::vector<DwellCheckpoint> noisy_dwells(Estimating& at, int dwells, double wal
             checkpoint.measurements.push_back(m);
         }
         if (p < first) continue;  // the same noise, whoever saw its beginning
-        rt::Ring<rt::BlockRecord> blocks{256};
-        rt::AngleBlocks averager(blocks);
-        averager.begin({.to = 40 * drivers::kSecond, .dwell = checkpoint.info});
-        at.filter.begin_dwell(checkpoint.info);
-        for (const auto& m : checkpoint.measurements) {
-            if (at.filter.add(m).outcome == estimator::StepOutcome::used)
-                averager.add(m.time_s, m.angle_rad);
-        }
-        checkpoint.summary = at.filter.end_dwell();
-        averager.end();
-        blocks.consume([&](const rt::BlockRecord& block) { at.noise.add(block); }, 256);
-        at.noise.conclude(checkpoint.summary, at.filter);
+        checkpoint.summary = take(checkpoint);
         done.push_back(std::move(checkpoint));
     }
     return done;
@@ -389,7 +402,7 @@ std::vector<DwellCheckpoint> noisy_dwells(Estimating& at, int dwells, double wal
 TEST_F(JournalTest, GoesOnWithTheNoiseLevelsThatTheMonitorHadCameTo) {
     // GIVEN a campaign whose monitor has changed the filter's N
     Estimating uninterrupted;
-    std::vector<DwellCheckpoint> dwells = noisy_dwells(uninterrupted, 12, 8e-3);
+    std::vector<DwellCheckpoint> dwells = noisy_dwells(std::ref(uninterrupted), 12, 8e-3);
     const auto& first = dwells.front().summary.noise;
     const auto& last = dwells.back().summary.noise;
     ASSERT_GT(last.gyro_random_walk_deg_per_rt_h[0], 1.5 * first.gyro_random_walk_deg_per_rt_h[0])
@@ -401,27 +414,30 @@ TEST_F(JournalTest, GoesOnWithTheNoiseLevelsThatTheMonitorHadCameTo) {
         EXPECT_TRUE(read.noise_known);
         dwell = read;
     }
-    Estimating resumed;
-    EXPECT_EQ(replay(dwells, resumed.again(40)), "");
+    auto resumed = fresh_book();
+    EXPECT_EQ(replay(dwells, resumed, 40 * drivers::kSecond), "");
     // THEN filter and monitor go on as the ones that were never interrupted
-    noisy_dwells(uninterrupted, 3, 8e-3, 13);
-    noisy_dwells(resumed, 3, 8e-3, 13);
+    noisy_dwells(std::ref(uninterrupted), 3, 8e-3, 13);
+    noisy_dwells(
+        [&](const DwellCheckpoint& dwell) {
+            return resumed.take_again({dwell.info, 40 * drivers::kSecond, dwell.measurements, {}});
+        },
+        3, 8e-3, 13);
     EXPECT_EQ(uninterrupted.filter.noise().gyro_random_walk_deg_per_rt_h,
-              resumed.filter.noise().gyro_random_walk_deg_per_rt_h);
+              resumed.identification().noise().gyro_random_walk_deg_per_rt_h);
     estimator::Estimate left, right;
     uninterrupted.filter.estimate(left);
-    resumed.filter.estimate(right);
+    resumed.identification().estimate(right);
     EXPECT_EQ(left.value, right.value);
-    EXPECT_EQ(uninterrupted.filter.covariance(), resumed.filter.covariance());
-    EXPECT_EQ(uninterrupted.noise.status().dwells, resumed.noise.status().dwells);
+    EXPECT_EQ(uninterrupted.filter.covariance(), resumed.identification().covariance());
+    EXPECT_EQ(uninterrupted.noise.status().dwells, resumed.noise().status().dwells);
 
     // and levels that are not those it comes to again are refused
     dwells.back().summary.noise.gyro_random_walk_deg_per_rt_h[2] *= 1.001;
-    EXPECT_THAT(replay(dwells, Estimating().again(40)),
-                HasSubstr("run 1 position 12 was filtered with"));
+    EXPECT_THAT(replayed(dwells, 40), HasSubstr("run 1 position 12 was filtered with"));
     // unless they were not kept
     dwells.back().noise_known = false;
-    EXPECT_EQ(replay(dwells, Estimating().again(40)), "");
+    EXPECT_EQ(replayed(dwells, 40), "");
 }
 
 TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
@@ -502,7 +518,7 @@ TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {
     ASSERT_TRUE(journal.recovery().campaign);
     EXPECT_THAT(journal.recovery().assumed, HasSubstr("2 checkpoints of version 1"));
     EXPECT_FALSE(journal.recovery().campaign->dwells[0].stop_known);
-    EXPECT_EQ(replay(journal.recovery().campaign->dwells, Estimating().again(20)), "");
+    EXPECT_EQ(replayed(journal.recovery().campaign->dwells, 20), "");
 }
 
 TEST_F(JournalTest, PutsADamagedOrNewerFileAside) {

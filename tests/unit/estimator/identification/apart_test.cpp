@@ -124,6 +124,8 @@ TEST(Apart, ASweepIsNoRowAndLeavesTheFilterAlone) {
     EXPECT_EQ(with.rows().size(), 28U);
     EXPECT_EQ(with.covariance_now(), without.covariance_now());
     EXPECT_EQ(with.result().dwells.size(), 30U);
+    // Nor has it innovations that could be too small.
+    EXPECT_EQ(with.result().warnings, without.result().warnings);
 }
 
 /// A dead accelerometer is no sweep.
