@@ -2,120 +2,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
-#include "daemon/journal/database.hpp"
-#include "daemon/record/campaign_file.hpp"
-#include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/candump_campaign.hpp"
-#include "daemon/record/digest.hpp"
 #include "daemon/record/dwells_csv.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/replay.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "tests/unit/daemon/record/parts.hpp"
 
 namespace vibrig::record {
 namespace {
-
-namespace fs = std::filesystem;
-using drivers::kSecond;
-using drivers::Time;
-
-constexpr Time kStep = 25 * drivers::kMillisecond;
-
-/// Every number another one.
-estimator::DwellRow row_of(int position) {
-    estimator::DwellRow row;
-    row.run = 1;
-    row.position = position;
-    row.middle_s = 100.0 * position;
-    for (Eigen::Index j = 0; j < 3; ++j) {
-        row.rate[j] = 1.0 + static_cast<double>(j);
-        row.ramp_variance(j, j) = 4.0 + static_cast<double>(j);
-        for (Eigen::Index k = 0; k < 3; ++k)
-            row.variance(j, k) = 10.0 + static_cast<double>(3 * j + k);
-        for (Eigen::Index t = 0; t < 10; ++t)
-            row.regressors(j, t) = 100.0 + static_cast<double>(10 * j + t);
-    }
-    row.vibration.gamma = {0.1, 1, 0.2, 0.3, 0.4, 0.5};
-    return row;
-}
-
-/// Campaigns in recordings/test-1: files with samples, and dwells of 100 samples.
-class Parts : public ::testing::Test {
-  protected:
-    Parts() {
-        std::string name = (fs::temp_directory_path() / "vibrig-parts.XXXXXX").string();
-        recordings_ = ::mkdtemp(name.data());
-        folder_ = recordings_ / "test-1";
-        fs::create_directory(folder_);
-    }
-    ~Parts() override {
-        std::error_code ignored;
-        fs::remove_all(recordings_, ignored);
-    }
-
-    static Head head(int part, bool restart = false, std::size_t before = 0) {
-        Head head;
-        head.name = "test";
-        head.started_by = "A. Person";
-        head.utc_ns = (1'700'000'000 + 1000 * part) * kSecond;
-        head.utc_offset_ns = 1'700'000'000 * kSecond;
-        head.clock = "real";
-        head.campaign = "test-1";
-        head.part = part;
-        head.restart = restart;
-        head.dwells_before = before;
-        return head;
-    }
-    /// `orders`: positions, each 100 samples from the next hundred on; the first `done` are done.
-    void write(const Head& head, Time from, const std::vector<int>& orders, std::size_t done,
-               const char* state = "finished") {
-        CampaignWriter writer((folder_ / part_name(head.part)).string(), head);
-        for (int i = 0; i < 400; ++i) {
-            drivers::Sample sample;
-            sample.time = from + i * kStep;
-            sample.sequence = static_cast<std::uint32_t>(i);
-            sample.force = {0, 1, 0};
-            writer.put(sample);
-        }
-        for (std::size_t i = 0; i < orders.size(); ++i) {
-            const Time at = from + static_cast<Time>(i) * 100 * kStep;
-            writer.put(Order{at,
-                             at,
-                             at + 100 * kStep,
-                             1,
-                             orders[i],
-                             9.0,
-                             false,
-                             {},
-                             0,
-                             {5.0, {1e-3, 1e-3, 1e-3}}});
-            if (i >= done) continue;
-            Dwell dwell;
-            dwell.time = at + 100 * kStep;
-            dwell.summary.run = 1;
-            dwell.summary.position = orders[i];
-            dwell.summary.samples = 100;
-            if (i > 0) dwell.row = row_of(orders[i]);
-            writer.put(dwell);
-        }
-        writer.end({state, "", "", "{}", head.utc_ns + kSecond});
-    }
-    std::string refusal() const {
-        try {
-            static_cast<void>(read_campaign(folder_.string()));
-        } catch (const std::runtime_error& error) {
-            return error.what();
-        }
-        return {};
-    }
-
-    fs::path recordings_, folder_;
-};
 
 TEST_F(Parts, HaveTheRowsOfTheirDwellsInTheOrderOfTheCoefficients) {
     write(head(1), 10 * kSecond, {1, 2}, 2);
@@ -228,95 +129,6 @@ TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
     fs::rename(folder_ / "campaign-2.h5", folder_ / "other.h5");
     EXPECT_THROW(static_cast<void>(read_campaign((folder_ / "other.h5").string())),
                  std::runtime_error);
-}
-
-TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
-    // GIVEN one campaign that is there, and many more in the index
-    write(head(1), 10 * kSecond, {1}, 1, "finished");
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
-    Index(recordings_.string(), tell).note(folder_.string());
-    const std::string path = Index::path_in(recordings_.string());
-    {
-        journal::Database database(path);
-        database.execute("BEGIN");
-        for (int i = 0; i < 20'000; ++i) {
-            const std::string key = "other-" + std::to_string(i);
-            database.run("INSERT INTO campaign VALUES (?, 'other', 'A. Person', ?, 'finished')",
-                         {std::string_view(key), std::int64_t{i}});
-        }
-        database.execute("COMMIT");
-    }
-    // THEN it is found by key and by name, and what is not is told with some that are
-    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    EXPECT_EQ(find_campaign("other-19999", {recordings_.string()}, tell),
-              (recordings_ / "other-19999").string());
-    try {
-        static_cast<void>(find_campaign("tset", {recordings_.string()}, tell));
-        FAIL() << "found";
-    } catch (const std::runtime_error& error) {
-        EXPECT_NE(std::string(error.what()).find("other-11 ..."), std::string::npos)
-            << error.what();
-    }
-    EXPECT_TRUE(told.empty());
-    // WHEN pages that opening does not read are overwritten
-    {
-        std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-        file.seekp(16 * 4096);
-        file << std::string(fs::file_size(path) - 16 * 4096, 'x');
-    }
-    // THEN it is made anew from the files, and told
-    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
-        << told[0];
-}
-
-TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
-    write(head(1), 10 * kSecond, {1}, 1, "continued");
-    write(head(2), 100 * kSecond, {2}, 1);
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
-    {
-        Index index(recordings_.string(), tell);
-        EXPECT_TRUE(index.campaigns().empty());
-        index.note(folder_.string());
-    }
-    const auto campaigns = Index(recordings_.string(), tell).campaigns();
-    ASSERT_EQ(campaigns.size(), 1U);
-    EXPECT_EQ(campaigns[0].key, "test-1");
-    EXPECT_EQ(campaigns[0].state, "finished");
-    ASSERT_EQ(campaigns[0].files.size(), 2U);
-    const auto& file = campaigns[0].files[0];
-    EXPECT_EQ(file.name, "campaign-2.h5");
-    EXPECT_TRUE(file.closed);
-    EXPECT_EQ(file.rows, 400);
-    EXPECT_EQ(file.from_utc_ns, 1'700'000'100 * kSecond);
-    EXPECT_EQ(file.to_utc_ns, 1'700'000'100 * kSecond + 399 * kStep);
-    EXPECT_EQ(file.bytes, static_cast<std::int64_t>(fs::file_size(folder_ / file.name)));
-    EXPECT_EQ(file.sha256, sha256_of_file((folder_ / file.name).string()));
-    // WHEN a campaign is asked for by its name, THEN it is found
-    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    EXPECT_EQ(find_campaign("test-1", {recordings_.string()}, tell), folder_.string());
-    EXPECT_THROW(static_cast<void>(find_campaign("tset", {recordings_.string()}, tell)),
-                 std::runtime_error);
-    EXPECT_TRUE(told.empty());
-    // WHEN the last part is gone, THEN the index knows it
-    fs::remove(folder_ / "campaign-2.h5");
-    EXPECT_THROW(compare_with_index(folder_.string(), tell), std::runtime_error);
-}
-
-TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {
-    write(head(1), 10 * kSecond, {1}, 1);
-    std::ofstream(Index::path_in(recordings_.string())) << std::string(5000, 'x');
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
-    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
-        << told[0];
-    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    EXPECT_EQ(told.size(), 1U);
 }
 
 /// Three segments of a raw log, a minute each, and another's log of the time between.

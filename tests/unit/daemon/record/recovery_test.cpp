@@ -1,0 +1,45 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "daemon/record/campaign_file.hpp"
+#include "tests/unit/daemon/record/recording.hpp"
+
+namespace vibrig::record {
+namespace {
+
+TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
+    // GIVEN what is on the disk while a campaign is written
+    const std::string path = (folder_ / "campaign.h5").string();
+    {
+        CampaignWriter writer((folder_ / "living.h5").string(), head());
+        for (const auto& sample : samples(500, 0)) writer.put(sample);
+        put_order(writer, 3, 2 * drivers::kSecond, 100 * drivers::kSecond);
+        writer.commit();
+        EXPECT_THROW(static_cast<void>(recover((folder_ / "living.h5").string(), {})),
+                     std::runtime_error);
+        fs::copy_file(folder_ / "living.h5", path);
+    }
+    // WHEN it is mended
+    const Recovery recovery = recover(path, {}).at(0);
+    // THEN it says what there is and what is lost
+    EXPECT_FALSE(recovery.was_closed);
+    EXPECT_EQ(recovery.samples, 500U);
+    EXPECT_EQ(recovery.cut_dwell, "run 1 position 3: 420 samples, 10.475 of 98.000 s, are there");
+    const Campaign read = read_campaign(path);
+    EXPECT_EQ(read.state, "recovered");
+    EXPECT_EQ(read.samples.size(), 500U);
+    ASSERT_EQ(read.gaps.size(), 1U);
+    EXPECT_EQ(read.gaps[0].stream, "end");
+    // AND a second time there is nothing to do
+    const std::string bytes = file(path);
+    const Recovery again = recover(path, {}).at(0);
+    EXPECT_TRUE(again.was_closed);
+    EXPECT_TRUE(again.recovered);
+    EXPECT_EQ(again.cut_dwell, recovery.cut_dwell);
+    EXPECT_EQ(again.words, recovery.words);
+    EXPECT_EQ(file(path), bytes);
+}
+
+}  // namespace
+}  // namespace vibrig::record

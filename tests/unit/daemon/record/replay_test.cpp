@@ -1,0 +1,40 @@
+#include "daemon/record/replay.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/daemon/record/recording.hpp"
+
+namespace vibrig::record {
+namespace {
+
+TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
+    // GIVEN a campaign of two dwells, as it was the first time
+    Campaign campaign;
+    campaign.samples = samples(4000, drivers::kSecond);
+    for (const int position : {1, 2}) {
+        const std::size_t first = position == 1 ? 100 : 2100;
+        campaign.orders.push_back({campaign.samples[first - 50].time, campaign.samples[first].time,
+                                   campaign.samples[first + 1500].time, 1, position, 9.0, false});
+    }
+    estimator::Settings settings;
+    const auto once = replay(campaign, settings, {});
+    ASSERT_EQ(once.dwells.size(), 2U);
+    EXPECT_EQ(once.dwells[0].summary.samples, 1500U);
+    EXPECT_GT(once.dwells[0].summary.used, 1400U);
+    campaign.dwells = once.dwells;
+    // WHEN it is replayed, at another speed too
+    for (const double speed : {0.0, 2000.0}) {
+        const auto again = replay(campaign, settings, {.speed = speed});
+        EXPECT_EQ(again.compared, 2U);
+        EXPECT_EQ(again.different, 0U) << again.first_difference;
+    }
+    // THEN one last bit in one sample is seen
+    double& angle = campaign.samples[900].angle[1];
+    angle = std::nextafter(angle, 1.0);
+    EXPECT_GT(replay(campaign, settings, {}).different, 0U);
+}
+
+}  // namespace
+}  // namespace vibrig::record
