@@ -177,51 +177,5 @@ TEST(CanPortSettingsCheck, WaitsForAHubThatIsNotThereYet) {
     EXPECT_EQ(lines[1], settings.path + ": running");
 }
 
-TEST(CanPortSettingsCheck, RefusesNamesThatCannotBe) {
-    boost::asio::io_context io;
-    CanPortSettings settings;
-    settings.kind = CanPortSettings::Kind::seqpacket;
-    for (const std::string& path :
-         {std::string(), std::string("bus"), std::string("@"),
-          std::string("/") + std::string(200, 'x'), std::string("/a\0b", 4)}) {
-        settings.path = path;
-        EXPECT_THROW(static_cast<void>(drivers::make_can_port(io, settings)), drivers::CanError)
-            << path;
-    }
-    settings.kind = CanPortSettings::Kind::socketcan;
-    for (const char* name : {"", "a name", "can0/1", "averyveryverylongname", ".."}) {
-        settings.interface = name;
-        EXPECT_THROW(static_cast<void>(drivers::make_can_port(io, settings)), drivers::CanError)
-            << name;
-    }
-}
-
-TEST(CanPortSettingsCheck, NamesAnInterfaceThatIsNoCan) {
-    // GIVEN the loopback interface, or a kernel without CAN
-    boost::asio::io_context io;
-    CanPortSettings settings;
-    settings.interface = "lo";
-    const auto port = drivers::make_can_port(io, settings);
-    try {
-        port->start(nullptr, nullptr, nullptr);
-        FAIL() << "started on lo";
-    } catch (const drivers::CanError& error) {
-        EXPECT_TRUE(std::string(error.what()).starts_with("lo: ")) << error.what();
-    }
-}
-
-TEST(KernelStamp, IsCarriedToTheMonotonicClockWithItsAgeBounded) {
-    const drivers::ClockPair clocks{.monotonic = 5'000'000'000,
-                                    .realtime = 1'700'000'000'000'000'000};
-    // GIVEN a stamp 3 ms old: it is 3 ms ago
-    EXPECT_EQ(clocks.to_monotonic(clocks.realtime - 3'000'000), 4'997'000'000);
-    // GIVEN a wall clock that was set forward by an hour in between: a second ago, not an hour
-    EXPECT_EQ(clocks.to_monotonic(clocks.realtime - 3600 * drivers::kSecond), 4'000'000'000);
-    // GIVEN one that was set back: now, not in the future
-    EXPECT_EQ(clocks.to_monotonic(clocks.realtime + 3600 * drivers::kSecond), 5'000'000'000);
-    // AND whole microseconds
-    EXPECT_EQ(clocks.to_monotonic(clocks.realtime - 1'234) % 1000, 0);
-}
-
 }  // namespace
 }  // namespace vibrig::test
