@@ -1,6 +1,6 @@
 // Rigs that are not the model, simulated by the independent plant: what their results are worth,
 // and what the verdict says. A quiet rig's rows are had once for each misfit, noise of its known
-// size is drawn on them; what moves by chance is in chance_test.cpp.
+// size is drawn on them; what moves by chance is in assessment_chance_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
