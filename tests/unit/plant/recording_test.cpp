@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -82,6 +81,37 @@ TEST(Positions, AreReadFromAFileAndBadOnesNamed) {
     EXPECT_NE(complaint("alpha_deg,beta_deg,gamma_deg\n1,90,0\n").find("80"), std::string::npos);
     EXPECT_NE(complaint("").find("no positions"), std::string::npos);
     EXPECT_THROW(static_cast<void>(read_positions(folder.file("absent.csv"))), PlantError);
+}
+
+TEST(Recording, FollowsAnOrderAndTellsTheMeanOfWhatDrifts) {
+    Truth truth;
+    truth.bias_step_deg_h = {0.4, 0, 0};
+    truth.step_after_dwell = 3;
+    CampaignPlan plan;
+    plan.positions_deg = {{0, 0, 0}, {0, 0, 1}};
+    plan.table_g = {2, 0};
+    plan.dwell_s = 1;
+    plan.order = parse_order("2.1,1.2, 1.1,2.2");
+    std::vector<std::pair<std::size_t, std::size_t>> seen;
+    std::ostringstream out;
+    std::array<GyroCoefficients, 3> mean{};
+    EXPECT_EQ(record(truth, plan, out, &mean), 160U);
+    std::istringstream lines(out.str());
+    std::string line;
+    std::getline(lines, line);
+    while (std::getline(lines, line)) {
+        std::size_t run = 0, position = 0;
+        ASSERT_EQ(std::sscanf(line.c_str(), "%*f,%zu,%zu", &run, &position), 2) << line;
+        if (seen.empty() || seen.back() != std::pair(run, position))
+            seen.emplace_back(run, position);
+    }
+    EXPECT_EQ(seen, plan.order);
+    EXPECT_NEAR(mean[0][kF], 1 + 0.4 / 4, 1e-12);
+    EXPECT_NEAR(mean[1][kF], -1, 1e-12);
+    for (const char* bad : {"1", "1.2.3", "a.1", "1.1,,2.1", "0x1.1"})
+        EXPECT_THROW(static_cast<void>(parse_order(bad)), PlantError) << bad;
+    plan.order = parse_order("3.1");
+    EXPECT_THROW(record(truth, plan, out), PlantError);
 }
 
 }  // namespace
