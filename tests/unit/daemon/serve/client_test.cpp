@@ -92,5 +92,21 @@ TEST(Client, GivesUpInItsTimeWhereNobodyTakesIt) {
     EXPECT_GE(std::chrono::steady_clock::now() - begun, 200ms);
 }
 
+TEST(Client, SaysWhoDoesNotAnswer) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("nobody.sock");
+    try {
+        (void)Client(path).get("/healthz");
+        FAIL() << "nobody is there";
+    } catch (const NotRunning& error) {
+        EXPECT_EQ(std::string(error.what())
+                      .rfind("no vibrigd answers at " + path + " (is it running?", 0),
+                  0u)
+            << error.what();
+    }
+    EXPECT_THROW((void)Client(std::string(300, 'x')).get("/healthz"), ClientError);
+    EXPECT_THROW((void)Client("").get("/healthz"), ClientError);
+}
+
 }  // namespace
 }  // namespace vibrig::serve

@@ -22,6 +22,10 @@ namespace vibrig::serve {
 [[nodiscard]] estimator::Result full_result();
 [[nodiscard]] v1::Status message_of(const StatusData& data);
 
+[[nodiscard]] inline bool holds(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
 /// A daemon without devices.
 class FakeSource : public StatusSource {
   public:

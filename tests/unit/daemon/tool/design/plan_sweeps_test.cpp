@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/plan/plan_file.hpp"
-#include "tests/unit/daemon/plan/survey_command.hpp"
+#include "tests/unit/daemon/tool/design/survey_command.hpp"
 
 namespace vibrig::plan::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/unit/daemon/tool/predict_fixture.hpp"
+#include "tests/unit/daemon/tool/analysis/predict_fixture.hpp"
 
 namespace vibrig::tool {
 namespace {

@@ -1,18 +1,14 @@
+#include "daemon/plan/adaptive.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <random>
 
-#include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/forecast.hpp"
-#include "estimator/filter/kinematics.hpp"
-#include "estimator/identification/crlb.hpp"
 #include "estimator/identification/identification.hpp"
-#include "estimator/plan/exact.hpp"
-#include "estimator/plan/positions.hpp"
-#include "tests/plant/recording.hpp"
+#include "tests/unit/daemon/plan/simulated_rig.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
 namespace vibrig::plan {
@@ -20,60 +16,6 @@ namespace {
 
 using estimator::Identification;
 using estimator::kParameters;
-
-constexpr double kDwell = 100, kPeriod_s = 0.025;
-
-/// The simulated rig, one dwell at a time, each with noise of its own.
-class SimulatedRig {
-  public:
-    explicit SimulatedRig(std::uint64_t seed) { truth_.seed = 1000 * seed; }
-
-    void dwell(Identification& to, const PlannedRun& run) {
-        plant::CampaignPlan plan;
-        plan.positions_deg = {run.position_deg};
-        plan.table_g = {run.table_g};
-        plan.dwell_s = kDwell;
-        ++truth_.seed;
-        ++dwells_;
-        to.begin_dwell({1, dwells_, run.table_g});
-        static_cast<void>(plant::simulate(truth_, plan, [&](const plant::PlannedSample& s) {
-            estimator::Measurement m;
-            m.time_s = s.time_s;
-            for (std::size_t k = 0; k < 3; ++k) {
-                m.angle_rad[k] = s.readings.encoder_deg[k] * std::numbers::pi / 180;
-                m.force_g[k] = s.readings.raw_g[k];
-            }
-            static_cast<void>(to.add(m));
-        }));
-        static_cast<void>(to.end_dwell());
-        if (run.table_g > 0) shaker_s_ += kDwell + timing_.settle_s + 2 * timing_.ramp_s;
-        rig_s_ += kDwell + timing_.settle_s + (run.table_g > 0 ? 2 * timing_.ramp_s : 0) +
-                  planning::slew_s(here_, run.position_deg, timing_);
-        here_ = run.position_deg;
-    }
-
-    [[nodiscard]] double shaker_s() const { return shaker_s_; }
-    [[nodiscard]] double rig_s() const { return rig_s_; }
-    [[nodiscard]] int dwells() const { return dwells_; }
-    [[nodiscard]] const std::array<double, 3>& here() const { return here_; }
-    [[nodiscard]] double truth(std::size_t i) const { return truth_.coefficients[i / 10][i % 10]; }
-
-  private:
-    plant::Truth truth_;
-    planning::Timing timing_;
-    std::array<double, 3> here_{};
-    double shaker_s_ = 0, rig_s_ = 0;
-    int dwells_ = 0;
-};
-
-std::vector<PlannedRun> fourteen_positions() {
-    std::vector<PlannedRun> runs;
-    for (const double table_g : {9.0, 7.0}) {
-        for (const auto& position : plant::CampaignPlan::table1())
-            runs.push_back({position, table_g * estimator::Settings{}.transmission, table_g, 1});
-    }
-    return runs;
-}
 
 /// Root mean square of sigma over nominal, all 30.
 double accuracy(const std::array<double, kParameters>& sigma, const SimulatedRig& rig) {
@@ -87,82 +29,6 @@ double error_over_nominal(const estimator::Result& result, const SimulatedRig& r
     for (std::size_t i = 0; i < kParameters; ++i)
         sum += std::pow((result.value[i] - rig.truth(i)) / rig.truth(i), 2);
     return std::sqrt(sum / kParameters);
-}
-
-TEST(PlannedCampaign, PredictedStandardErrorsAreThoseOfTheFilter) {
-    // GIVEN an exact plan of 14 runs at 0 and 6 g, and what is expected of it
-    const estimator::Settings settings;
-    planning::Problem problem;
-    std::vector<PlannedRun> candidates;
-    for (const double table_g : {0.0, 9.0}) {
-        for (const auto& u : planning::cube_directions()) {
-            const double level = table_g * settings.transmission;
-            candidates.push_back({*planning::position_for(settings, u, {}), level, table_g, 1});
-            problem.points.push_back({planning::vibration_row(u, level)});
-        }
-    }
-    const auto counts = planning::exact_design(problem, 14, {});
-    std::vector<PlannedRun> runs;
-    for (std::size_t i = 0; i < counts.size(); ++i)
-        runs.insert(runs.end(), counts[i], candidates[i]);
-    const Forecast expected = forecast(settings, runs, kDwell, kPeriod_s);
-    ASSERT_TRUE(expected.identifies_all);
-
-    // WHEN it is run on the simulated rig
-    SimulatedRig rig(1);
-    Identification identification(settings);
-    for (const PlannedRun& run : runs) rig.dwell(identification, run);
-
-    // THEN every standard error agrees within 10 %, and the covariance is the result's
-    const auto result = identification.result();
-    const auto covariance = identification.covariance();
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        EXPECT_NEAR(result.sigma[i] / expected.sigma[i], 1.0, 0.1)
-            << estimator::parameter_names()[i];
-        EXPECT_NEAR(std::sqrt(covariance[i * kParameters + i]), result.sigma[i],
-                    1e-9 * result.sigma[i]);
-    }
-}
-
-TEST(PlannedCampaign, OneLevelIsRefusedWithNamesAndRemedy) {
-    const estimator::Settings settings;
-    auto runs = fourteen_positions();
-    runs.resize(14);
-    const Forecast one = forecast(settings, runs, kDwell, kPeriod_s);
-    EXPECT_FALSE(one.identifies_all);
-    EXPECT_EQ(one.rank, 9U);
-    for (const char* words : {"D_Fx", "D_OOz", "cheapest remedy: add (", "at 0 g"})
-        EXPECT_NE(one.refusal.find(words), std::string::npos) << words << ": " << one.refusal;
-    // AND levels that lie close are warned of
-    for (const PlannedRun& run : fourteen_positions()) {
-        if (run.table_g == 9) runs.push_back({run.position_deg, 5.9, 5.9 / 0.6667, 1});
-    }
-    const Forecast close = forecast(settings, runs, kDwell, kPeriod_s);
-    EXPECT_TRUE(close.identifies_all);
-    EXPECT_NE(close.warning.find("would halve"), std::string::npos) << close.warning;
-}
-
-TEST(PlannedCampaign, TheForecastIsTheSameHoweverTheEncodersCount) {
-    // GIVEN the 14 positions on a rig whose encoders count the other way, from other zeros
-    estimator::Settings rig;
-    rig.encoder_sign = {-1, 1, -1};
-    rig.encoder_zero_deg = {30, -2, 200};
-    auto runs = fourteen_positions();
-    const Forecast plain = forecast({}, runs, kDwell, kPeriod_s);
-    for (PlannedRun& run : runs) run.position_deg = estimator::encoder_deg(rig, run.position_deg);
-    // THEN what its encoders have to show gives the same standard errors, and what they would have
-    // to show elsewhere does not
-    const Forecast there = forecast(rig, runs, kDwell, kPeriod_s);
-    for (std::size_t i = 0; i < kParameters; ++i)
-        EXPECT_NEAR(there.sigma[i] / plain.sigma[i], 1, 1e-6) << estimator::parameter_names()[i];
-    EXPECT_FALSE(forecast({}, runs, kDwell, kPeriod_s).sigma == plain.sigma);
-    // AND an adaptive campaign expects as many dwells
-    AdaptiveSettings adaptive;
-    adaptive.period_s = kPeriod_s;
-    adaptive.table_g = {9, 0};
-    adaptive.target = {0.006, 0.005, 0.0005};
-    EXPECT_EQ(AdaptivePlan(rig, adaptive).outlook().left,
-              AdaptivePlan({}, adaptive).outlook().left);
 }
 
 TEST(AdaptivePlan, SaysWhetherTargetsOrTimeEndIt) {

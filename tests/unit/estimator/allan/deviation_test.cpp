@@ -1,12 +1,13 @@
+#include "estimator/allan/deviation.hpp"
+
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <vector>
 
-#include "estimator/allan/deviation.hpp"
-#include "estimator/allan/overlap_kernel.hpp"
 #include "estimator/allan/synthetic.hpp"
 #include "tests/unit/estimator/allan/support.hpp"
 
@@ -113,78 +114,6 @@ TEST(Interval, CoversTheTruthAsOftenAsItSays) {
     }
 }
 
-TEST(Interval, ChiSquareQuantilesAgreeWithTables) {
-    EXPECT_NEAR(chi_square_quantile(0.95, 1), 3.841458820694124, 1e-9);
-    EXPECT_NEAR(chi_square_quantile(0.05, 10), 3.940299136076, 1e-9);
-    EXPECT_NEAR(chi_square_quantile(0.999, 100), 149.4492525, 1e-6);
-    EXPECT_NEAR(chi_square_quantile(0.5, 2), 2 * std::numbers::ln2, 1e-11);
-    EXPECT_NEAR(chi_square_quantile(0.5, 1e5), 1e5 - 2.0 / 3, 1e-3);
-}
-
-TEST(NoiseIdentification, NamesTheFivePowerLaws) {
-    // GIVEN pure noise types, flicker PM left out: no coefficient here makes it
-    const std::array<std::pair<Terms, Alpha>, 4> types{{{Terms{1, 0, 0, 0, 0}, 2},
-                                                        {Terms{0, 1, 0, 0, 0}, 0},
-                                                        {Terms{0, 0, 1, 0, 0}, -1},
-                                                        {Terms{0, 0, 0, 1, 0}, -2}}};
-    // WHEN each is identified in 20 records THEN the mean exponent is nearest to the true one
-    constexpr unsigned kRuns = 20;
-    for (const auto& [terms, alpha] : types) {
-        for (const std::size_t m : {1U, 8U, 32U}) {
-            double mean = 0;
-            for (unsigned run = 0; run < kRuns; ++run) {
-                const Series series =
-                    Series::from_rate(synthetic_rate(terms, 4096, 1.0, 770 + run), 1.0);
-                mean += identify_noise(series, m, 9) / double{kRuns};
-            }
-            EXPECT_NEAR(mean, alpha, 0.5) << "m = " << m << ", seeds from 770";
-        }
-    }
-    const Series brief = Series::from_rate(synthetic_rate(types[1].first, 28, 1.0, 1), 1.0);
-    EXPECT_EQ(identify_noise(brief, 10, 9), 9);
-}
-
-TEST(NoiseIdentification, DoesNotMistakeARowOfWhiteNoise) {
-    // GIVEN 200 records of white FM WHEN each row's noise is identified for its interval
-    constexpr int kRuns = 200;
-    constexpr std::size_t kSamples = 4096;
-    std::size_t rows = 0;
-    std::size_t narrow = 0;
-    for (unsigned run = 0; run < kRuns; ++run) {
-        const Series series = Series::from_rate(white(kSamples, 1, 5000 + run), 1.0);
-        for (const Point& p : deviations(series, Statistic::oadev, octave_factors(kSamples / 2))) {
-            ++rows;
-            narrow += p.edf > 2 * edf(Statistic::oadev, 0, kSamples + 1, p.m) ? 1U : 0U;
-        }
-    }
-    // THEN none is more than 1.4 times too narrow: the exponent's error is 0.14 and half of one is
-    // 3.5 of it, 5e-4; three times that for the few rows that share their points
-    EXPECT_LE(narrow, static_cast<std::size_t>(1.5e-3 * static_cast<double>(rows)))
-        << "of " << rows << ", seeds from 5000";
-}
-
-TEST(Interval, TotalDeviationOfWhitePhaseKnowsItsReflectedEnds) {
-    // GIVEN white phase WHEN its total variance is taken 1000 times
-    constexpr int kRuns = 1000;
-    constexpr std::size_t kPhase = 401;
-    for (const std::size_t m : {1U, 4U, 40U, 100U, 180U}) {
-        double sum = 0;
-        double squares = 0;
-        for (unsigned run = 0; run < kRuns; ++run) {
-            const Series series = Series::from_phase(white(kPhase, 1, 9100 + run), 1.0);
-            const double dev =
-                deviations(series, Statistic::totdev, std::vector<std::size_t>{m})[0].dev;
-            sum += dev * dev / kRuns;
-            squares += std::pow(dev, 4) / kRuns;
-        }
-        const double found = 2 * sum * sum / (squares - sum * sum);
-        // THEN edf is 2 mean^2 / variance: its relative error is sqrt((2 + 12 / edf) / runs)
-        const double stated = edf(Statistic::totdev, 2, kPhase, m);
-        EXPECT_NEAR(found / stated, 1, 4 * std::sqrt((2 + 12 / stated) / kRuns))
-            << "m = " << m << ", seeds from 9100";
-    }
-}
-
 TEST(Gap, NoDifferenceSpansIt) {
     // GIVEN two quiet halves with a step of the angle hidden in the gap between them
     std::vector<double> phase(201);
@@ -240,71 +169,6 @@ TEST(Gap, NeverRaisesTheDegreesOfFreedom) {
             EXPECT_EQ(point.alpha, 0) << "m " << point.m << ", seed " << kSeed + run;
             EXPECT_LT(point.edf, edf(Statistic::oadev, 0, kSamples + 1, point.m))
                 << "m " << point.m << ", seed " << kSeed + run;
-        }
-    }
-}
-
-TEST(Data, UnusableRecordsAreRefusedWithNumbers) {
-    const auto why = [](const std::vector<double>& rate) -> std::string {
-        try {
-            require_usable(Series::from_rate(rate, 1.0), inspect(rate), rate.empty() ? 0 : rate[0]);
-        } catch (const DataError& error) {
-            return error.what();
-        }
-        return "";
-    };
-    EXPECT_NE(why({}).find("0 present"), std::string::npos);
-    EXPECT_NE(why({1, 2, 3}).find("3 present, at least 9"), std::string::npos);
-    EXPECT_NE(why(std::vector<double>(20, 0.25)).find("all 20 samples are 0.25"),
-              std::string::npos);
-    std::vector<double> holes = white(20, 1, 1);
-    holes[3] = holes[4] = holes[9] = kNaN;
-    EXPECT_NE(why(holes).find("3 of 20 (longest gap 2)"), std::string::npos);
-    EXPECT_EQ(why(white(20, 1, 1)), "");
-}
-
-TEST(Data, OutliersAreCountedAndTheLsbIsFound) {
-    std::vector<double> rate = white(1000, 1.0, 8);
-    for (double& y : rate) {
-        y = std::round(y * 4) / 4;
-    }
-    rate[321] = 500;
-    rate[400] = -500;
-    const Inspection found = inspect(rate);
-    EXPECT_EQ(found.outliers, 2U);
-    EXPECT_EQ(found.first_outlier, 321U);
-    EXPECT_DOUBLE_EQ(found.lsb, 0.25);
-}
-
-TEST(Factors, ListsAreCheckedAgainstTheRecord) {
-    EXPECT_EQ(octave_factors(9), (std::vector<std::size_t>{1, 2, 4, 8}));
-    EXPECT_EQ(decade_factors(45), (std::vector<std::size_t>{1, 2, 4, 10, 20, 40}));
-    EXPECT_EQ(all_factors(3), (std::vector<std::size_t>{1, 2, 3}));
-    EXPECT_EQ(log_factors(1000, 4), (std::vector<std::size_t>{1, 10, 100, 1000}));
-    EXPECT_EQ(log_factors(0, 4).size(), 0U);
-    EXPECT_EQ(factors_of(std::array{0.1, 0.3}, 0.1, 5), (std::vector<std::size_t>{1, 3}));
-    EXPECT_THROW(static_cast<void>(factors_of(std::array{0.25}, 0.1, 5)), DataError);
-    EXPECT_THROW(static_cast<void>(factors_of(std::array{0.6}, 0.1, 5)), DataError);
-    EXPECT_THROW(static_cast<void>(factors_of(std::array{kNaN}, 0.1, 5)), DataError);
-    EXPECT_THROW(static_cast<void>(factors_of(std::array{-0.1}, 0.1, 5)), DataError);
-    EXPECT_THROW(static_cast<void>(statistic_named("avar")), DataError);
-}
-
-TEST(OverlapKernel, EqualsThePlainLoopForEveryLengthOfRemainder) {
-    // GIVEN lengths around the block of 64 and factors that reach past the end
-    for (const std::size_t points : {1U, 2U, 3U, 63U, 64U, 65U, 129U, 200U, 333U}) {
-        const std::vector<double> x = white(points, 1.0, points);
-        const std::vector<std::size_t> factors{1, 2, 31, 32, 64, 100, 400};
-        std::vector<double> sums(factors.size(), 0.0);
-        // WHEN
-        add_overlapping_squares(x.data(), points, factors.data(), factors.size(), sums.data());
-        // THEN
-        for (std::size_t k = 0; k < factors.size(); ++k) {
-            double expected = 0;
-            for (std::size_t i = 0; i + 2 * factors[k] < points; ++i) {
-                expected += std::pow(x[i + 2 * factors[k]] - 2 * x[i + factors[k]] + x[i], 2);
-            }
-            EXPECT_NEAR(sums[k], expected, 1e-12 * expected) << points << " " << factors[k];
         }
     }
 }

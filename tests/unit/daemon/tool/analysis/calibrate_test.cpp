@@ -1,128 +1,30 @@
-#include "estimator/plan/calibration.hpp"
-
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
+#include <string>
+#include <vector>
 
-#include "estimator/plan/positions.hpp"
+#include "tests/unit/estimator/plan/calibration_readings.hpp"
 
+namespace vibrig::tool {
 namespace {
 
-using namespace vibrig::estimator::plan;
+using estimator::plan::kSigma;
+using estimator::plan::kTermNames;
+using estimator::plan::kTerms;
+using estimator::plan::kTruth;
+using estimator::plan::output_of;
+using estimator::plan::Reading;
+using estimator::plan::readings;
+using estimator::plan::Vec3;
 using Json = nlohmann::json;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr Row kTruth{3e-3, 1.002, -4e-4, 2e-4, 5e-6, -2e-6, 1e-6, 3e-6, -1e-6, 2e-6};
-constexpr double kSigma = 2e-6;
-
-/// The model, written a second time.
-double output_of(const Vec3& x) {
-    const auto [d0, d1, d2, d3, d11, d22, d33, d12, d13, d23] = kTruth;
-    return d0 + d1 * x[0] + d2 * x[1] + d3 * x[2] + d11 * x[0] * x[0] + d22 * x[1] * x[1] +
-           d33 * x[2] * x[2] + d12 * x[0] * x[1] + d13 * x[0] * x[2] + d23 * x[1] * x[2];
-}
-
-/// The 26 directions on these spheres, each `times`, with noise and a cubic term of the input axis.
-std::vector<Reading> readings(const std::vector<double>& spheres, int times, std::uint64_t seed,
-                              bool stated, double cubic = 0) {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal;
-    std::vector<Reading> list;
-    for (int k = 0; k < times; ++k) {
-        for (const double radius : spheres) {
-            for (Vec3 x : cube_directions()) {
-                for (double& value : x) value *= radius;
-                list.push_back({x,
-                                output_of(x) + cubic * std::pow(x[0], 3) + kSigma * normal(random),
-                                stated ? kSigma : 0});
-            }
-        }
-    }
-    return list;
-}
-
-TEST(Calibration, SeedsShowErrorsAsLargeAsStated) {
-    // GIVEN 100 tests on two spheres, the noise stated and not
-    constexpr int kRuns = 100;
-    for (const bool stated : {true, false}) {
-        double squares = 0;
-        int rejected = 0;
-        for (unsigned run = 0; run < kRuns; ++run) {
-            const SensorCalibration c = calibrate(readings({1, 2}, 2, 100 + run, stated));
-            ASSERT_TRUE(c.test);
-            rejected += c.test->probability < 0.05 ? 1 : 0;
-            for (std::size_t k = 0; k < kTerms; ++k)
-                squares += std::pow((c.value[k] - kTruth[k]) / c.sigma[k], 2) / (10.0 * kRuns);
-        }
-        // THEN z-rms is 1: 1000 numbers, 1 sigma 0.022; correlated ones at most three times that
-        EXPECT_NEAR(std::sqrt(squares), 1, 0.1) << "seeds from 100, stated " << stated;
-        // and the test of the residuals rejects one in twenty: binomial, 1 sigma 2.2
-        EXPECT_NEAR(rejected, 5, 4 * 2.2) << "seeds from 100, stated " << stated;
-    }
-}
-
-TEST(Calibration, SeedsShowThatAModelThatDoesNotHoldIsRejected) {
-    // GIVEN a cubic term of 2 sigma at 1 g, 16 at 2 g, WHEN the ten terms are fitted
-    for (unsigned run = 0; run < 20; ++run) {
-        for (const bool stated : {true, false}) {
-            const SensorCalibration c =
-                calibrate(readings({1, 2}, 2, 300 + run, stated, 2 * kSigma));
-            // THEN
-            ASSERT_TRUE(c.test);
-            EXPECT_LT(c.test->probability, 1e-3) << "seed " << 300 + run << ", stated " << stated;
-        }
-    }
-}
-
-TEST(Calibration, OneSphereLeavesTheBiasAndTheSquaresUndetermined) {
-    const SensorCalibration c = calibrate(readings({1}, 2, 7, true));
-    EXPECT_EQ(c.plan.rank, 9U);
-    EXPECT_EQ(c.plan.undetermined(), "D0, D11, D22, D33");
-    EXPECT_TRUE(std::isinf(c.sigma[0]));
-    EXPECT_TRUE(std::isinf(c.sigma[4]));
-    // What is determined is right all the same
-    for (const std::size_t k : {1U, 2U, 3U, 7U, 8U, 9U})
-        EXPECT_NEAR(c.value[k], kTruth[k], 4 * c.sigma[k]) << kTermNames[k];
-    EXPECT_GT(c.test->probability, 1e-3);
-}
-
-TEST(Calibration, BadReadingsAreRefused) {
-    const auto why = [](std::vector<Reading> list) -> std::string {
-        try {
-            static_cast<void>(calibrate(list));
-        } catch (const PlanError& error) {
-            return error.what();
-        }
-        return "";
-    };
-    std::vector<Reading> list = readings({1, 2}, 1, 1, true);
-    EXPECT_NE(why({list.begin(), list.begin() + 9}).find("9 readings, expected 10"),
-              std::string::npos);
-    auto bad = list;
-    bad[3].output = kNaN;
-    EXPECT_NE(why(bad).find("reading 4"), std::string::npos);
-    bad = list;
-    bad[5].sigma = 0;
-    EXPECT_NE(why(bad).find("reading 6: found sigma 0"), std::string::npos);
-    bad[5].sigma = kNaN;
-    EXPECT_NE(why(bad).find("reading 6"), std::string::npos);
-    // As many readings as coefficients: a solution, nothing to judge it by
-    Terms line{};
-    line[0] = line[1] = true;
-    const SensorCalibration c = calibrate({{{-1, 0, 0}, -2, 0}, {{1, 0, 0}, 4, 0}}, line);
-    EXPECT_NEAR(c.value[0], 1, 1e-12);
-    EXPECT_NEAR(c.value[1], 3, 1e-12);
-    EXPECT_TRUE(std::isnan(c.sigma[1]));
-    EXPECT_FALSE(c.test);
-}
 
 class CalibrateCommand : public ::testing::Test {
   protected:
@@ -272,3 +174,4 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
 }
 
 }  // namespace
+}  // namespace vibrig::tool

@@ -8,7 +8,7 @@
 
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/spectrum/sampling.hpp"
-#include "tests/unit/daemon/plan/survey_command.hpp"
+#include "tests/unit/daemon/tool/design/survey_command.hpp"
 
 namespace {
 

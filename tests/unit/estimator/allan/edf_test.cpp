@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "estimator/allan/deviation.hpp"
+#include "estimator/allan/synthetic.hpp"
+#include "tests/unit/estimator/allan/support.hpp"
+
+namespace {
+
+using namespace vibrig::estimator::allan;
+using vibrig::test::white;
+
+TEST(Interval, ChiSquareQuantilesAgreeWithTables) {
+    EXPECT_NEAR(chi_square_quantile(0.95, 1), 3.841458820694124, 1e-9);
+    EXPECT_NEAR(chi_square_quantile(0.05, 10), 3.940299136076, 1e-9);
+    EXPECT_NEAR(chi_square_quantile(0.999, 100), 149.4492525, 1e-6);
+    EXPECT_NEAR(chi_square_quantile(0.5, 2), 2 * std::numbers::ln2, 1e-11);
+    EXPECT_NEAR(chi_square_quantile(0.5, 1e5), 1e5 - 2.0 / 3, 1e-3);
+}
+
+TEST(NoiseIdentification, NamesTheFivePowerLaws) {
+    // GIVEN pure noise types, flicker PM left out: no coefficient here makes it
+    const std::array<std::pair<Terms, Alpha>, 4> types{{{Terms{1, 0, 0, 0, 0}, 2},
+                                                        {Terms{0, 1, 0, 0, 0}, 0},
+                                                        {Terms{0, 0, 1, 0, 0}, -1},
+                                                        {Terms{0, 0, 0, 1, 0}, -2}}};
+    // WHEN each is identified in 20 records THEN the mean exponent is nearest to the true one
+    constexpr unsigned kRuns = 20;
+    for (const auto& [terms, alpha] : types) {
+        for (const std::size_t m : {1U, 8U, 32U}) {
+            double mean = 0;
+            for (unsigned run = 0; run < kRuns; ++run) {
+                const Series series =
+                    Series::from_rate(synthetic_rate(terms, 4096, 1.0, 770 + run), 1.0);
+                mean += identify_noise(series, m, 9) / double{kRuns};
+            }
+            EXPECT_NEAR(mean, alpha, 0.5) << "m = " << m << ", seeds from 770";
+        }
+    }
+    const Series brief = Series::from_rate(synthetic_rate(types[1].first, 28, 1.0, 1), 1.0);
+    EXPECT_EQ(identify_noise(brief, 10, 9), 9);
+}
+
+TEST(NoiseIdentification, DoesNotMistakeARowOfWhiteNoise) {
+    // GIVEN 200 records of white FM WHEN each row's noise is identified for its interval
+    constexpr int kRuns = 200;
+    constexpr std::size_t kSamples = 4096;
+    std::size_t rows = 0;
+    std::size_t narrow = 0;
+    for (unsigned run = 0; run < kRuns; ++run) {
+        const Series series = Series::from_rate(white(kSamples, 1, 5000 + run), 1.0);
+        for (const Point& p : deviations(series, Statistic::oadev, octave_factors(kSamples / 2))) {
+            ++rows;
+            narrow += p.edf > 2 * edf(Statistic::oadev, 0, kSamples + 1, p.m) ? 1U : 0U;
+        }
+    }
+    // THEN none is more than 1.4 times too narrow: the exponent's error is 0.14 and half of one is
+    // 3.5 of it, 5e-4; three times that for the few rows that share their points
+    EXPECT_LE(narrow, static_cast<std::size_t>(1.5e-3 * static_cast<double>(rows)))
+        << "of " << rows << ", seeds from 5000";
+}
+
+TEST(Interval, TotalDeviationOfWhitePhaseKnowsItsReflectedEnds) {
+    // GIVEN white phase WHEN its total variance is taken 1000 times
+    constexpr int kRuns = 1000;
+    constexpr std::size_t kPhase = 401;
+    for (const std::size_t m : {1U, 4U, 40U, 100U, 180U}) {
+        double sum = 0;
+        double squares = 0;
+        for (unsigned run = 0; run < kRuns; ++run) {
+            const Series series = Series::from_phase(white(kPhase, 1, 9100 + run), 1.0);
+            const double dev =
+                deviations(series, Statistic::totdev, std::vector<std::size_t>{m})[0].dev;
+            sum += dev * dev / kRuns;
+            squares += std::pow(dev, 4) / kRuns;
+        }
+        const double found = 2 * sum * sum / (squares - sum * sum);
+        // THEN edf is 2 mean^2 / variance: its relative error is sqrt((2 + 12 / edf) / runs)
+        const double stated = edf(Statistic::totdev, 2, kPhase, m);
+        EXPECT_NEAR(found / stated, 1, 4 * std::sqrt((2 + 12 / stated) / kRuns))
+            << "m = " << m << ", seeds from 9100";
+    }
+}
+
+}  // namespace
