@@ -1,11 +1,12 @@
+#include "daemon/rt/rig_clock.hpp"
+
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <memory>
 #include <thread>
 #include <vector>
-
-#include "daemon/rt/real_clock.hpp"
-#include "daemon/rt/rig_clock.hpp"
 
 namespace vibrig::rt {
 namespace {
@@ -20,31 +21,6 @@ void wait_for_rest(RigClock& clock) {
         clock.rest().wait(10 * kMillisecond);
         clock.rest().clear();
     }
-}
-
-TEST(RealClock, WakesAtTheDeadlineAndNotBefore) {
-    RealClock clock;
-    const auto waiter = clock.make_waiter();
-    const Time deadline = clock.now() + 20 * kMillisecond;
-    EXPECT_FALSE(waiter->wait_until(deadline));
-    EXPECT_GE(clock.now(), deadline);
-}
-
-TEST(RealClock, ANoticeBeforeTheWaitIsNotLost) {
-    RealClock clock;
-    const auto waiter = clock.make_waiter();
-    waiter->notify();
-    waiter->notify();
-    EXPECT_TRUE(waiter->wait_until(kNever));
-    EXPECT_FALSE(waiter->wait_until(clock.now() + kMillisecond));
-}
-
-TEST(RealClock, ANoticeFromAnotherThreadWakes) {
-    RealClock clock;
-    const auto waiter = clock.make_waiter();
-    std::thread other([&] { waiter->notify(); });
-    EXPECT_TRUE(waiter->wait_until(kNever));
-    other.join();
 }
 
 TEST(RigClock, IsNotAtRestUntilEveryOwnerSleeps) {
