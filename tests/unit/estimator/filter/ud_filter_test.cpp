@@ -6,7 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::testing {
 namespace {
@@ -212,6 +215,38 @@ TEST(UdFilter, FixedConstantsStayFixed) {
             EXPECT_EQ(ud.constants()[i], 0.0);
         }
     }
+}
+
+TEST(UdFilter, ConstantsThatMovedHaveTheirVarianceMoreAndNothingElse) {
+    // GIVEN a filter whose constants have come to depend on one another
+    const std::uint64_t seed = 5;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> gauss;
+    std::array<double, UdFilter::kConstants> sigma{};
+    for (double& s : sigma) s = 1 + std::abs(gauss(random));
+    UdFilter filter(sigma);
+    filter.start_angles({}, 25);
+    for (int n = 0; n < 200; ++n) {
+        UdFilter::Transition t{};
+        for (std::size_t r = 0; r < 3; ++r) {
+            t.f[r][r] = 1;
+            for (std::size_t c = 0; c < 3; ++c) t.g[r][c] = t.noise_map[r][c] = gauss(random);
+        }
+        t.noise = 0.1;
+        for (std::size_t i = 0; i < UdFilter::kConstants; ++i) t.h[i] = gauss(random);
+        filter.predict(t);
+        static_cast<void>(filter.update({gauss(random), gauss(random), gauss(random)}, 25, 1e9));
+    }
+    Covariance before, after;
+    filter.covariance(before.data());
+    // WHEN the first three move
+    filter.let_first_move(0.04);
+    filter.covariance(after.data());
+    // THEN it is as the dense matrices say
+    Covariance expected = before;
+    expected.diagonal().head<3>().array() += 0.04;
+    EXPECT_LT((after - expected).cwiseAbs().maxCoeff(), 1e-13 * before.cwiseAbs().maxCoeff());
 }
 
 }  // namespace

@@ -3,14 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <vector>
 
+#include "estimator/filter/angles.hpp"
+
 namespace vibrig::estimator {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 struct Platform {
     double frequency_hz = 15, platform_g = 0.3333, table_g = 0.5, phase_deg = -125;

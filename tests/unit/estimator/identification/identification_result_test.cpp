@@ -1,0 +1,46 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/unit/estimator/identification/identified.hpp"
+
+namespace vibrig::estimator::testing {
+namespace {
+
+TEST(CrossCheck, TheBatchAgreesWithTheFilterOnEitherRouteAndAtOneLevel) {
+    SCOPED_TRACE("seed " + std::to_string(kCrossSeed));
+    Settings joint, two_step;
+    two_step.method = Method::two_step;
+    // GIVEN campaigns with gaps and spikes WHEN they are identified
+    for (const Result& result : {identified(joint, {6, 14.0 / 3}), identified(two_step, {6, 4}),
+                                 identified(joint, {6, 6}), identified(joint, {6, 0})}) {
+        // THEN the batch was done, differs from the filter by rounding and linearisation only and
+        // nobody is warned
+        EXPECT_TRUE(result.cross_check.done);
+        EXPECT_GT(result.cross_check.largest, 0) << "two ways never agree to the last bit";
+        EXPECT_LE(result.cross_check.largest, CrossCheck::kLimit) << result.cross_check.coefficient;
+        EXPECT_FALSE(told(result, "batch least squares"));
+    }
+}
+
+TEST(CrossCheck, ADisagreementNamesItsCoefficient) {
+    SCOPED_TRACE("seed " + std::to_string(kCrossSeed));
+    // GIVEN a gate that lets everything in and angles off by 20 deg now and then, which tilt the
+    // vertical of the batch but not that of the filter
+    Settings settings;
+    settings.gate_nis = 1e9;
+    const Result result =
+        identified(settings, {6, 14.0 / 3}, [](const DwellInfo&, int n, Measurement& m) {
+            if (n % 100 == 50) m.angle_rad[0] += 0.35;
+        });
+    // THEN the warning names the coefficient that differs most
+    EXPECT_FALSE(result.cross_check.agrees());
+    EXPECT_TRUE(told(result, "puts " + result.cross_check.coefficient + " off by"));
+}
+
+TEST(CrossCheck, WithoutDataNothingIsCompared) {
+    EXPECT_FALSE(Identification(Settings{}).result().cross_check.done);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::testing
