@@ -57,7 +57,8 @@ void be_last() {
 
 }  // namespace
 
-Outbox::Outbox(Settings settings, std::string recordings, Unit unit, Event event)
+Outbox::Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit,
+               Event event)
     : settings_(std::move(settings)),
       recordings_(std::move(recordings)),
       unit_(std::move(unit)),

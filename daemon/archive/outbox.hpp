@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/archive/settings.hpp"
+#include "daemon/configuration/archive_settings.hpp"
 #include "daemon/domain/events.hpp"
 #include "daemon/domain/services.hpp"
 
@@ -30,7 +30,7 @@ class Outbox {
         bool simulated = false;
     };
     /// `recordings`: the folder of campaigns' folders. `event` is called in its thread.
-    Outbox(Settings settings, std::string recordings, Unit unit, Event event);
+    Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit, Event event);
     ~Outbox();
     Outbox(const Outbox&) = delete;
     Outbox& operator=(const Outbox&) = delete;
@@ -71,7 +71,7 @@ class Outbox {
     /// With what waits, by a look at the folders.
     void show_waiting(const std::function<void(ArchiveStatus&)>& change);
 
-    const Settings settings_;
+    const configuration::ArchiveSettings settings_;
     const std::string recordings_;
     const Unit unit_;
     const std::string program_;

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "daemon/archive/settings.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/fleet/settings.hpp"
+#include "daemon/configuration/archive_settings.hpp"
+#include "daemon/configuration/mqtt_settings.hpp"
+#include "daemon/configuration/record_settings.hpp"
 #include "daemon/interlock/interlock_table.hpp"
 #include "daemon/interlock/random_witness.hpp"
-#include "daemon/record/settings.hpp"
 #include "drivers/annunciator/annunciator.hpp"
 #include "drivers/can/can_port.hpp"
 #include "drivers/gimbal/gimbal.hpp"
@@ -112,16 +112,16 @@ struct Configuration {
     } server;
     std::string guard_socket;                  ///< [guard] socket; empty: there is no guard
     drivers::AnnunciatorSettings annunciator;  ///< [annunciator]
-    fleet::Settings mqtt;                      ///< [mqtt]
+    MqttSettings mqtt;                         ///< [mqtt]
     std::string log_level = "info";            ///< [log] level
     std::string log_file;                      ///< [log] file; empty: standard error
     /// [journal] file; empty: journal.sqlite3 in results, and none without results
     std::string journal;
     std::string results;  ///< [campaign] results: folder for result.json; empty: none written
     std::vector<rt::Rule> interlock = rt::default_interlock();  ///< [[interlock]]
-    record::Settings record;                                    ///< [record]
-    record::Paperwork paperwork;                                ///< [unit], [[instrument]]
-    archive::Settings archive;                                  ///< [archive]
+    RecordSettings record;                                      ///< [record]
+    Paperwork paperwork;                                        ///< [unit], [[instrument]]
+    ArchiveSettings archive;                                    ///< [archive]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
     int acquisition_cpu = -1;  ///< [threads] keeps to this one; -1: any

@@ -184,7 +184,7 @@ void CrossCheck::doors() {
 }
 
 void CrossCheck::broker() {
-    const fleet::Settings& mqtt = c_.mqtt;
+    const MqttSettings& mqtt = c_.mqtt;
     if (!sound({"mqtt.host", "mqtt.tls"}) || mqtt.host.empty()) return;
     if (!mqtt.tls && !loopback(mqtt.host)) {
         refuse({"mqtt.tls", "mqtt.host"}, "false with the broker at " + mqtt.host,

@@ -14,7 +14,7 @@ namespace {
 using C = Configuration;
 
 std::vector<Key> record_keys() {
-    using R = record::Settings;
+    using R = RecordSettings;
     const auto record = part(&C::record);
     return {
         boolean("record.enabled", record(&R::enabled), "campaigns are recorded"),
@@ -47,7 +47,7 @@ std::string index_rule(const std::string& text) {
 }
 
 std::vector<Key> archive_keys() {
-    using A = archive::Settings;
+    using A = ArchiveSettings;
     const auto archive = part(&C::archive);
     return {
         text("archive.folder", archive(&A::folder), "a path",
@@ -71,7 +71,7 @@ std::vector<Key> archive_keys() {
 }
 
 std::vector<Key> mqtt_keys() {
-    using M = fleet::Settings;
+    using M = MqttSettings;
     const auto mqtt = part(&C::mqtt);
     return {
         text("mqtt.host", mqtt(&M::host), "a host name or numeric address, or \"\"",

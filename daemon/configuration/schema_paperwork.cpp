@@ -26,7 +26,7 @@ std::string date_text(const toml::date& date) {
 }
 
 void read_instrument(const Entry& entry, const toml::table& table, C& c) {
-    record::Instrument to;
+    Instrument to;
     const std::size_t problems = entry.problems.count();
     for (const auto& [name, node] : table) {
         const std::string part(name.str());
@@ -67,7 +67,7 @@ void read_instruments(const Entry& entry, C& c) {
 }
 
 std::string write_instruments(C& c) {
-    return write_list(c.paperwork.instruments, [](const record::Instrument& i) {
+    return write_list(c.paperwork.instruments, [](const Instrument& i) {
         return "{ name = " + write_text(i.name) + ", serial = " + write_text(i.serial) +
                ", certificate = " + write_text(i.certificate) +
                (i.uncertainty.empty() ? "" : ", uncertainty = " + write_text(i.uncertainty)) +
@@ -80,9 +80,9 @@ std::string write_instruments(C& c) {
 std::vector<Key> paperwork_keys() {
     const auto paperwork = part(&C::paperwork);
     return {
-        text("unit.type", paperwork(&record::Paperwork::unit_type), "at most 120 bytes",
+        text("unit.type", paperwork(&Paperwork::unit_type), "at most 120 bytes",
              "unit under test, for the report", short_text_rule),
-        text("unit.serial", paperwork(&record::Paperwork::unit_serial), "at most 120 bytes",
+        text("unit.serial", paperwork(&Paperwork::unit_serial), "at most 120 bytes",
              "its serial number", short_text_rule),
         {"instrument", "tables", "", "rows: name, serial, certificate, uncertainty, due (a date)",
          "what it is measured with, for the report; an overdue one warns before arming",

@@ -57,7 +57,7 @@ struct Publisher::Impl {
         std::string trouble;  ///< what the broker or the library said last
     };
 
-    Impl(const StatusSource& from, const Settings& given, Log to)
+    Impl(const StatusSource& from, const configuration::MqttSettings& given, Log to)
         : source(from), settings(given), log(std::move(to)) {
         readable("ca", settings.ca);
         readable("certificate", settings.certificate);
@@ -264,7 +264,7 @@ struct Publisher::Impl {
     }
 
     const StatusSource& source;
-    const Settings settings;
+    const configuration::MqttSettings settings;
     const Log log;
     std::string password;
     EdgeNode node;  ///< the publisher's thread
@@ -275,7 +275,8 @@ struct Publisher::Impl {
     std::thread thread;
 };
 
-Publisher::Publisher(const StatusSource& source, const Settings& settings, Log log)
+Publisher::Publisher(const StatusSource& source, const configuration::MqttSettings& settings,
+                     Log log)
     : impl_(std::make_shared<Impl>(source, settings, std::move(log))) {}
 
 Publisher::~Publisher() { impl_->end(); }

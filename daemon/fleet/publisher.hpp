@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/fleet/settings.hpp"
+#include "daemon/configuration/mqtt_settings.hpp"
 #include "daemon/status/source.hpp"
 
 namespace vibrig::fleet {
@@ -18,7 +18,7 @@ class Publisher {
 
     /// Throws std::runtime_error that names the key for a file that cannot be read. `log` is called
     /// from the publisher's thread.
-    Publisher(const StatusSource& source, const Settings& settings, Log log);
+    Publisher(const StatusSource& source, const configuration::MqttSettings& settings, Log log);
     ~Publisher();
     void start();
     void stop();  ///< tells the broker the node's death and ends the thread, within two seconds

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/allan/analysis.hpp"
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/allan_analysis.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/dynamic.hpp"
 #include "estimator/allan/synthetic.hpp"

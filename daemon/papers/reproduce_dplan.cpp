@@ -5,10 +5,12 @@
 
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/design/plan_study.hpp"
-#include "daemon/tool/design/plan_turntable.hpp"
+#include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
+#include "estimator/plan/positions.hpp"
+#include "estimator/plan/spheres.hpp"
+#include "estimator/plan/vertical_axes.hpp"
 
 namespace vibrig::tool::dplan {
 
@@ -29,7 +31,7 @@ void add(Reproduction& table, const std::string& item, const std::string& publis
 constexpr std::size_t kFaces = 6, kEdges = 12, kAll = 26;
 
 /// Both spheres: points 0 to 25 inside, 26 to 51 outside.
-Problem two_spheres(double r) { return planner::spheres_problem({1, r}); }
+Problem two_spheres(double r) { return planning::spheres_problem({1, r}); }
 
 /// Runs per point of the inner and outer sphere's faces and corners.
 Effort double_sphere(double inner_faces, double inner_corners, double outer_faces,
@@ -70,7 +72,7 @@ void add_ranks(Reproduction& table) {
                                         {"[12]", false, true, false, "9"},
                                         {"[6]+[8]", true, false, true, "9"},
                                         {"all 26", true, true, true, "9"}}};
-    const Problem one = planner::spheres_problem({1});
+    const Problem one = planning::spheres_problem({1});
     for (const Set& set : kSets) {
         Effort effort;
         for (std::size_t i = 0; i < kAll; ++i) {
@@ -280,8 +282,8 @@ void add_position_table(Reproduction& table) {
     constexpr std::array<const char*, 3> kDerived{"5 directions, rank 5 / 6, 0.000, 0.000",
                                                   "11 directions, rank 9 / 10, 0.581, 0.648",
                                                   "9 directions, rank 8 / 9, 0.000, 0.000"};
-    const auto strong = planner::vertical_axes({}, positions, {4.667, 6});
-    const auto weak = planner::vertical_axes({}, positions, {0, 6});
+    const auto strong = planning::vertical_axes({}, positions, {4.667, 6});
+    const auto weak = planning::vertical_axes({}, positions, {0, 6});
     for (std::size_t k = 0; k < kDerived.size(); ++k) {
         add(table, printed("14 positions, %c vertical: D-eff. at 6 + 4.667 and 6 + 0 g", "xyz"[k]),
             "-", kDerived[k],

@@ -29,8 +29,9 @@ using StdFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 }  // namespace
 
-RawLog::RawLog(std::string folder, std::string interface, const Settings& settings,
-               std::int64_t utc_offset_ns, Closed on_closed, std::function<void()> on_progress)
+RawLog::RawLog(std::string folder, std::string interface,
+               const configuration::RecordSettings& settings, std::int64_t utc_offset_ns,
+               Closed on_closed, std::function<void()> on_progress)
     : folder_(std::move(folder)),
       settings_(settings),
       utc_offset_ns_(utc_offset_ns),

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "daemon/configuration/record_settings.hpp"
 #include "daemon/record/records.hpp"
-#include "daemon/record/settings.hpp"
 #include "proto/candump.hpp"
 
 namespace vibrig::record {
@@ -28,7 +28,7 @@ class RawLog {
   public:
     using Closed = std::function<void(const Segment&)>;
     /// `on_progress` is called while a segment is compressed.
-    RawLog(std::string folder, std::string interface, const Settings& settings,
+    RawLog(std::string folder, std::string interface, const configuration::RecordSettings& settings,
            std::int64_t utc_offset_ns, Closed on_closed, std::function<void()> on_progress = {});
     ~RawLog();
 
@@ -53,7 +53,7 @@ class RawLog {
     void lose(std::uint64_t frames, drivers::Time from, drivers::Time to);
 
     std::string folder_;
-    Settings settings_;
+    configuration::RecordSettings settings_;
     std::int64_t utc_offset_ns_;
     Closed on_closed_;
     std::function<void()> on_progress_;

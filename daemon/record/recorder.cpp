@@ -56,8 +56,8 @@ bool SentTap::send(const canfd_frame& frame, bool fd) noexcept {
     return sent;
 }
 
-Recorder::Recorder(const Settings& settings, std::string folder, const drivers::Clock& clock,
-                   drivers::Waiter& self, Event on_event)
+Recorder::Recorder(const configuration::RecordSettings& settings, std::string folder,
+                   const drivers::Clock& clock, drivers::Waiter& self, Event on_event)
     : settings_(settings),
       folder_(std::move(folder)),
       clock_(clock),

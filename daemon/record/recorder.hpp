@@ -10,13 +10,13 @@
 #include <thread>
 #include <variant>
 
+#include "daemon/configuration/record_settings.hpp"
 #include "daemon/domain/events.hpp"
 #include "daemon/domain/services.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/record/records.hpp"
-#include "daemon/record/settings.hpp"
 #include "daemon/rt/ring.hpp"
 #include "drivers/base/clock.hpp"
 #include "drivers/base/snapshot.hpp"
@@ -53,8 +53,8 @@ class Recorder {
     using Conditions = std::function<ConditionRow()>;
 
     /// `folder`: where campaigns' folders go. `on_event` is called in the recorder's thread.
-    Recorder(const Settings& settings, std::string folder, const drivers::Clock& clock,
-             drivers::Waiter& self, Event on_event);
+    Recorder(const configuration::RecordSettings& settings, std::string folder,
+             const drivers::Clock& clock, drivers::Waiter& self, Event on_event);
     ~Recorder();
 
     /// Acquisition pushes what it received, ...
@@ -129,7 +129,7 @@ class Recorder {
     void judge_disk();
     [[nodiscard]] bool room();
 
-    const Settings settings_;
+    const configuration::RecordSettings settings_;
     const std::string folder_;
     const drivers::Clock& clock_;
     drivers::Waiter& self_;

@@ -15,13 +15,13 @@ double coverage_of(const record::Campaign& campaign) {
     return configuration_of(campaign).estimator.uncertainty.coverage;
 }
 
-record::Paperwork paperwork_of(const record::Campaign& campaign) {
+configuration::Paperwork paperwork_of(const record::Campaign& campaign) {
     return configuration_of(campaign).paperwork;
 }
 
 std::string or_dash(const std::string& text) { return text.empty() ? "not stated" : text; }
 
-std::string unit_text(const record::Paperwork& unit) {
+std::string unit_text(const configuration::Paperwork& unit) {
     return or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial);
 }
 

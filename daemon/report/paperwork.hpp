@@ -4,8 +4,8 @@
 #include <string>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/record_settings.hpp"
 #include "daemon/record/campaign_file.hpp"
-#include "daemon/record/settings.hpp"
 
 namespace vibrig::report {
 
@@ -17,13 +17,13 @@ inline constexpr const char* kDriftModel =
 /// What of the campaign's configuration its identification depends on.
 [[nodiscard]] configuration::Configuration configuration_of(const record::Campaign& campaign);
 /// What the campaign's configuration states of unit and instruments.
-[[nodiscard]] record::Paperwork paperwork_of(const record::Campaign& campaign);
+[[nodiscard]] configuration::Paperwork paperwork_of(const record::Campaign& campaign);
 /// Coverage probability of U, 0 to 1.
 [[nodiscard]] double coverage_of(const record::Campaign& campaign);
 /// "not stated" for nothing.
 [[nodiscard]] std::string or_dash(const std::string& text);
 /// Type and serial number.
-[[nodiscard]] std::string unit_text(const record::Paperwork& unit);
+[[nodiscard]] std::string unit_text(const configuration::Paperwork& unit);
 /// "2026-03-01 08:00:00 UTC"
 [[nodiscard]] std::string utc_text(std::int64_t utc_ns);
 

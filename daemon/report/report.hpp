@@ -11,7 +11,7 @@ namespace vibrig::report {
 /// Another campaign of the same unit.
 struct Earlier {
     std::string path, name, when;
-    record::Paperwork paperwork;
+    configuration::Paperwork paperwork;
     Coefficients coefficients;
 };
 

@@ -39,7 +39,7 @@ void write_sample(benchmark::State& state) {
     const Folder folder;
     record::Head head;
     head.name = head.campaign = "bench";
-    record::Settings settings;
+    configuration::RecordSettings settings;
     settings.keep_free_mb = 0;
     settings.segment_mb = 4;
     record::CampaignWriter writer(folder.in("campaign.h5"), head);

@@ -5,7 +5,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/tool/analysis/allan_analysis.hpp"
+#include "daemon/allan/analysis.hpp"
+#include "daemon/tool/analysis/allan_live.hpp"
 #include "daemon/tool/commands.hpp"
 #include "proto/text.hpp"
 

@@ -1,3 +1,5 @@
+#include "daemon/tool/analysis/allan_live.hpp"
+
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -7,8 +9,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "daemon/allan/analysis.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/allan_analysis.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {

@@ -8,10 +8,10 @@
 #include <stdexcept>
 #include <vector>
 
+#include "daemon/allan/column_file.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/column_file.hpp"
 #include "daemon/tool/analysis/zero_output.hpp"
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/simulation.hpp"

@@ -226,7 +226,7 @@ std::string plan_json(const PlanStudy& study) {
     }
     if (!study.vertical_axes.empty()) {
         Json axes = Json::array();
-        for (const VerticalAxis& axis : study.vertical_axes) {
+        for (const planning::VerticalAxis& axis : study.vertical_axes) {
             axes.push_back({{"vertical", std::string(1, axis.axis)},
                             {"directions", axis.directions},
                             {"rank_one_level", axis.rank_one_level},
@@ -272,7 +272,7 @@ std::string plan_table(const PlanStudy& study) {
     }
     if (!study.vertical_axes.empty()) {
         text += "\nvertical at zero angles  directions  rank, one level / all  D-efficiency *\n";
-        for (const VerticalAxis& axis : study.vertical_axes) {
+        for (const planning::VerticalAxis& axis : study.vertical_axes) {
             text += printed("  %c %33zu %12zu / %-7zu %13.3f\n", axis.axis, axis.directions,
                             axis.rank_one_level, axis.rank, axis.d_efficiency);
         }

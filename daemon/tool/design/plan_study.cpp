@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <set>
 #include <stdexcept>
 
 #include "daemon/tool/design/plan_terms.hpp"
@@ -70,7 +69,8 @@ class Study {
         }
         choose_levels();
         make_candidates();
-        if (!listed_.empty()) out_.vertical_axes = vertical_axes(c_.estimator, listed_, levels_);
+        if (!listed_.empty())
+            out_.vertical_axes = planning::vertical_axes(c_.estimator, listed_, levels_);
         find_runs();
         put_in_order();
         judge();
@@ -470,43 +470,6 @@ PlanStudy study(const PlanRequest& request) { return Study(request).run(); }
 
 estimator::Settings frame_of(const PlanRequest& request) {
     return configuration::load(request.config, false).configuration.estimator;
-}
-
-std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
-                                        const std::vector<Vec3>& positions,
-                                        const std::vector<double>& levels_g) {
-    planning::Problem free;
-    const double highest = *std::max_element(levels_g.begin(), levels_g.end());
-    for (const double level : {0.0, highest > 0 ? highest : 1.0}) {
-        for (const Vec3& direction : planning::cube_directions())
-            free.points.push_back({planning::vibration_row(direction, level)});
-    }
-    const double optimum = planning::d_optimum(free).log_det;
-    std::vector<VerticalAxis> result;
-    for (int axis = 0; axis < 3; ++axis) {
-        VerticalAxis row;
-        row.axis = "xyz"[axis];
-        frame.up = {axis, 1};
-        std::set<std::array<long, 3>> directions;
-        planning::Problem one, all;
-        for (const double level : levels_g) {
-            for (const Vec3& position : positions) {
-                const Vec3 up = planning::up_at(frame, position);
-                directions.insert({std::lround(up[0] / kSameDirection),
-                                   std::lround(up[1] / kSameDirection),
-                                   std::lround(up[2] / kSameDirection)});
-                all.points.push_back({planning::vibration_row(up, level)});
-                if (level == levels_g.back()) one.points.push_back(all.points.back());
-            }
-        }
-        const auto whole = planning::evaluate(all, planning::Effort(all.size(), 1.0));
-        row.directions = directions.size();
-        row.rank_one_level = planning::evaluate(one, planning::Effort(one.size(), 1.0)).rank;
-        row.rank = whole.rank;
-        row.d_efficiency = planning::d_efficiency(whole, optimum);
-        result.push_back(row);
-    }
-    return result;
 }
 
 }  // namespace vibrig::tool::planner

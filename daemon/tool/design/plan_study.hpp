@@ -13,6 +13,7 @@
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"
+#include "estimator/plan/vertical_axes.hpp"
 #include "estimator/spectrum/about.hpp"
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/spectrum/sweep_bounds.hpp"
@@ -77,14 +78,6 @@ struct PlanRun {
         sweep{};  ///< in place of the frequency; the visit's level: where it begins
 };
 
-/// A position list read for one choice of the platform axis that is vertical at zero gimbal angles.
-struct VerticalAxis {
-    char axis = 'x';
-    std::size_t directions = 0;
-    std::size_t rank_one_level = 0, rank = 0;
-    double d_efficiency = 0;  ///< against the free choice of directions at 0 and the highest level
-};
-
 /// What is said of a plan over frequency besides.
 struct Survey {
     bool hard = false;
@@ -117,8 +110,8 @@ struct PlanStudy {
     plan::Forecast forecast;
     planning::Duration duration;
     double drift_imbalance = 0;
-    std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
-    std::vector<VerticalAxis> vertical_axes;     ///< if a position list was given
+    std::optional<PlanUncertainty> uncertainty;         ///< of a plan that determines everything
+    std::vector<planning::VerticalAxis> vertical_axes;  ///< if a position list was given
     std::vector<std::string> warnings;
     bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
     std::string refusal;         ///< empty: the plan determines everything
@@ -155,9 +148,5 @@ void put_sweeps_before(PlanStudy& study, const std::vector<PlanRun>& sweeps,
 [[nodiscard]] std::string plan_picture(const PlanStudy& study, const estimator::Settings& frame);
 /// The rig's, of a request's configuration.
 [[nodiscard]] estimator::Settings frame_of(const PlanRequest& request);
-
-[[nodiscard]] std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
-                                                      const std::vector<planning::Vec3>& positions,
-                                                      const std::vector<double>& levels_g);
 
 }  // namespace vibrig::tool::planner

@@ -10,6 +10,7 @@
 #include "daemon/tool/design/plan_terms.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
+#include "estimator/plan/spheres.hpp"
 #include "proto/json_number.hpp"
 
 namespace vibrig::tool::planner {
@@ -60,7 +61,7 @@ void find_growth(const planning::Counts& counts, const planning::Terms& terms,
                  TurntablePlan& plan) {
     const planning::Effort effort = planning::effort_of(counts);
     const auto log_det = [&](double r) {
-        const auto e = planning::evaluate(spheres_problem({1, r}, terms), effort);
+        const auto e = planning::evaluate(planning::spheres_problem({1, r}, terms), effort);
         return e.log_det + static_cast<double>(e.coefficients) * std::log(e.effort);
     };
     for (const double r : {1.1, 1.5, 2.0, 3.0, 5.0, 10.0}) {
@@ -100,25 +101,12 @@ std::size_t TurntablePlan::run_count() const {
     return sum;
 }
 
-planning::Problem spheres_problem(const std::vector<double>& spheres,
-                                  const planning::Terms& terms) {
-    planning::Problem problem;
-    problem.terms = terms;
-    for (const double radius : spheres) {
-        for (planning::Vec3 x : planning::cube_directions()) {
-            for (double& value : x) value *= radius;
-            problem.points.push_back({planning::turntable_row(x)});
-        }
-    }
-    return problem;
-}
-
 TurntablePlan turntable_plan(const TurntableRequest& request) {
     check(request);
     TurntablePlan plan;
     plan.request = request;
     const planning::Terms terms = terms_without(request.without);
-    const planning::Problem problem = spheres_problem(request.spheres, terms);
+    const planning::Problem problem = planning::spheres_problem(request.spheres, terms);
     const std::size_t directions = planning::cube_directions().size();
     const std::size_t runs = request.runs > 0 ? request.runs : 2 * problem.coefficients();
     planning::Counts counts;

@@ -41,10 +41,6 @@ struct TurntablePlan {
     [[nodiscard]] std::size_t run_count() const;
 };
 
-/// The 26 directions of the cube on every sphere, inner first; faces, edges, corners in this order.
-[[nodiscard]] estimator::plan::Problem spheres_problem(
-    const std::vector<double>& spheres,
-    const estimator::plan::Terms& terms = estimator::plan::kAllTerms);
 /// Throws std::runtime_error for bad input.
 [[nodiscard]] TurntablePlan turntable_plan(const TurntableRequest& request);
 [[nodiscard]] std::string turntable_json(const TurntablePlan& plan);

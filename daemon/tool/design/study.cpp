@@ -168,9 +168,9 @@ int submit(const StudyOptions& o) {
     return 0;
 }
 
-CLI::App* add_command(CLI::App& study, const char* name, const char* what,
-                      const std::shared_ptr<StudyOptions>& o, int& exit_code,
-                      int (*body)(const StudyOptions&)) {
+CLI::App* add_study_command(CLI::App& study, const char* name, const char* what,
+                            const std::shared_ptr<StudyOptions>& o, int& exit_code,
+                            int (*body)(const StudyOptions&)) {
     CLI::App* command = study.add_subcommand(name, what);
     command->add_flag("--json", o->json, "print it as JSON");
     command->callback(
@@ -179,8 +179,8 @@ CLI::App* add_command(CLI::App& study, const char* name, const char* what,
 }
 
 void add_run(CLI::App& study, const std::shared_ptr<StudyOptions>& o, int& exit_code) {
-    CLI::App* command =
-        add_command(study, "run", "Do what is not done of it, on this machine", o, exit_code, run);
+    CLI::App* command = add_study_command(
+        study, "run", "Do what is not done of it, on this machine", o, exit_code, run);
     command->add_option("FOLDER", o->folder, "a planned study")->required();
     command->add_option("-j,--threads", o->threads, "default: one for each processor")
         ->check(CLI::Range(1, 1024));
@@ -197,7 +197,7 @@ void add_run(CLI::App& study, const std::shared_ptr<StudyOptions>& o, int& exit_
 
 void add_merge(CLI::App& study, const std::shared_ptr<StudyOptions>& o, int& exit_code) {
     CLI::App* command =
-        add_command(study, "merge", "Statistics over all its tasks", o, exit_code, merge);
+        add_study_command(study, "merge", "Statistics over all its tasks", o, exit_code, merge);
     command->add_option("FOLDER", o->folder, "a planned study")->required();
     command->add_option("-o,--output", o->output, "write the result as JSON to this file");
     command->add_option("--csv", o->csv, "write a row for each coefficient and point");
@@ -221,7 +221,8 @@ void add_study(CLI::App& app, int& exit_code) {
                                          "this machine, or shared among many");
     study->require_subcommand(1);
     auto o = std::make_shared<StudyOptions>();
-    CLI::App* planning = add_command(*study, "plan", "Fix the list of tasks", o, exit_code, plan);
+    CLI::App* planning =
+        add_study_command(*study, "plan", "Fix the list of tasks", o, exit_code, plan);
     planning->add_option("STUDY", o->file, "what is studied (TOML)")->required();
     planning->add_option("-o,--output", o->folder, "folder to make; it must not exist")->required();
     planning
@@ -232,7 +233,7 @@ void add_study(CLI::App& app, int& exit_code) {
         "Example: vibrig study plan STUDY.toml -o s/\n"
         "Exit codes: 0 done, 2 bad usage or input.");
     add_run(*study, o, exit_code);
-    CLI::App* submission = add_command(
+    CLI::App* submission = add_study_command(
         *study, "submit", "Hand it to a scheduler, as an array of shards", o, exit_code, submit);
     submission->add_option("FOLDER", o->folder, "a planned study, where all nodes see it")
         ->required();
@@ -243,8 +244,8 @@ void add_study(CLI::App& app, int& exit_code) {
     submission->footer(
         "Example: vibrig study submit s/ --slurm --shards 64 -- --time=1:00:00 --cpus-per-task=4\n"
         "Exit codes: 0 submitted, 2 bad usage or input, or sbatch refused.");
-    CLI::App* look =
-        add_command(*study, "status", "What is done, and who is at work", o, exit_code, status);
+    CLI::App* look = add_study_command(*study, "status", "What is done, and who is at work", o,
+                                       exit_code, status);
     look->add_option("FOLDER", o->folder, "a planned study")->required();
     look->footer(
         "Example: vibrig study status s/\n"

@@ -14,7 +14,7 @@ namespace vibrig::record {
 namespace {
 
 TEST_F(Recording, OfFramesIsACandumpLogInSegmentsThatAreCompressed) {
-    Settings settings;
+    configuration::RecordSettings settings;
     settings.segment_s = 1;
     std::vector<Segment> closed;
     RawLog log(folder_.string(), "vcan0", settings, 1'700'000'000 * drivers::kSecond,
@@ -47,7 +47,7 @@ TEST_F(Recording, OfFramesIsACandumpLogInSegmentsThatAreCompressed) {
 TEST_F(Recording, OfFramesCountsWhatTheDiskRefusesAndGoesOnWhenItDoesNot) {
     // GIVEN a folder that is not there
     const fs::path gone = folder_ / "gone";
-    RawLog log(gone.string(), "vcan0", Settings{}, 0, {});
+    RawLog log(gone.string(), "vcan0", configuration::RecordSettings{}, 0, {});
     for (int i = 0; i < 3; ++i) log.add(frame(1, i * drivers::kSecond));
     log.flush();
     Gap gap;

@@ -17,7 +17,7 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
     rt::RealClock clock;
     const auto waiter = clock.make_waiter();
     std::vector<std::string> told;
-    Settings settings;
+    configuration::RecordSettings settings;
     settings.keep_free_mb = 0;
     Recorder recorder(settings, folder_.string(), clock, *waiter,
                       [&told](Severity, const std::string& text) { told.push_back(text); });

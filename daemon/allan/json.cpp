@@ -1,7 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tool/analysis/allan_analysis.hpp"
+#include "daemon/allan/analysis.hpp"
 #include "proto/json_number.hpp"
 
 namespace vibrig::tool {

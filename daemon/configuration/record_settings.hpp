@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-namespace vibrig::record {
+namespace vibrig::configuration {
 
-/// [record] of the configuration.
-struct Settings {
+/// [record]
+struct RecordSettings {
     bool enabled = true;
     std::string folder;  ///< a folder for each campaign goes here; empty: campaign.results
     bool raw = true;     ///< frames too, as candump logs
@@ -32,4 +32,4 @@ struct Paperwork {
     std::vector<Instrument> instruments;
 };
 
-}  // namespace vibrig::record
+}  // namespace vibrig::configuration

@@ -64,10 +64,6 @@ struct AllanAnalysis {
 
 /// Reads and analyses. Throws std::exception with what to tell the user.
 [[nodiscard]] AllanAnalysis analyse(const AllanRequest& request);
-/// Windows of rates that come on standard input, one a line: each is printed when it is complete.
-/// True if one was refused or raised an alarm. `page`: an HTML file with the surface of the newest
-/// windows and their coefficients, which loads itself again; empty: none. Throws as above.
-[[nodiscard]] bool allan_live(const AllanRequest& request, bool json, const std::string& page);
 /// 1 arcsec/s is 1 deg/h. Throws for a unit that is none.
 [[nodiscard]] double to_deg_per_hour(const std::string& unit, bool phase);
 [[nodiscard]] allan::DynamicSettings dynamic_settings(const AllanRequest& request);

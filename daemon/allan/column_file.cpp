@@ -1,4 +1,4 @@
-#include "daemon/tool/analysis/column_file.hpp"
+#include "daemon/allan/column_file.hpp"
 
 #include <unistd.h>
 #include <zlib.h>

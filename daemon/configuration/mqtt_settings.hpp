@@ -2,10 +2,10 @@
 
 #include <string>
 
-namespace vibrig::fleet {
+namespace vibrig::configuration {
 
 /// [mqtt]: the broker that watches a fleet of rigs.
-struct Settings {
+struct MqttSettings {
     std::string host;  ///< empty: off
     int port = 8883;
     bool tls = true;
@@ -17,4 +17,4 @@ struct Settings {
     double backoff_max_s = 60;
 };
 
-}  // namespace vibrig::fleet
+}  // namespace vibrig::configuration

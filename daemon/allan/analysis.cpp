@@ -1,4 +1,4 @@
-#include "daemon/tool/analysis/allan_analysis.hpp"
+#include "daemon/allan/analysis.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "daemon/allan/column_file.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/column_file.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {

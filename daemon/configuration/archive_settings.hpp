@@ -2,10 +2,10 @@
 
 #include <string>
 
-namespace vibrig::archive {
+namespace vibrig::configuration {
 
-/// [archive] of the configuration: where campaigns go when they are over.
-struct Settings {
+/// [archive]: where campaigns go when they are over.
+struct ArchiveSettings {
     std::string folder;        ///< a mounted file system; empty: nothing is archived
     std::string index;         ///< "postgresql://..."; empty: SQLite in the folder
     std::string rig;           ///< this rig's name there; empty: the machine's
@@ -13,4 +13,4 @@ struct Settings {
     int keep_mb = 0;           ///< delivered recordings beyond it are removed here; 0: none is
 };
 
-}  // namespace vibrig::archive
+}  // namespace vibrig::configuration

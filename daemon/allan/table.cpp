@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "daemon/allan/analysis.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/allan_analysis.hpp"
 
 namespace vibrig::tool {
 

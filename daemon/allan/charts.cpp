@@ -1,8 +1,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "daemon/allan/analysis.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/allan_analysis.hpp"
 
 namespace vibrig::tool {
 
