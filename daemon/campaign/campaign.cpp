@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 
 #include "daemon/campaign/stages/dwelling.hpp"
 #include "daemon/campaign/stages/opening.hpp"
@@ -74,6 +75,9 @@ Campaign::Campaign(const Settings& settings, const Ports& ports)
           ports_.rig.shaker, [this](Time at) { return ports_.rig.rest(at); }, settings_.stop),
       excitation_(settings_, ports_.rig, stop_),
       proof_(settings_.proof) {
+    if (!(settings_.sample_s > 0))
+        throw std::invalid_argument(fmt::format(
+            "campaign: {:g} s between samples found, expected above 0", settings_.sample_s));
     plan_stops();
     excitation_.for_whom(highest_level(), true);
     make_stages();

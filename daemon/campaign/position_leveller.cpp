@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 namespace vibrig::campaign {
@@ -24,18 +25,27 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
         loop.slow = level::design({s.slow_settling_s, s.residual, s.damping}, loop.earth).gains;
     }
     loop.ramp_s = s.slow_ramp_s;
-    loop.period_s = s.block * sample_s;
+    const std::uint32_t block = levelling_block(sample_s);
+    loop.period_s = block * sample_s;
     loop.window_s = s.window_s;
     loop.tolerance_rad = s.tolerance_arcmin * level::kArcmin;
     loop.torquer_limit = std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * level::kDegPerHour;
     loop.noise.accelerometer_mps2 =
-        rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(s.block));
+        rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(block));
     if (!s.velocity_north.empty()) loop.noise.reference_mps = s.velocity_noise_mps;
     loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * level::kPi / 180 / 60;
     return loop;
 }
 
 }  // namespace
+
+std::uint32_t levelling_block(double sample_s) {
+    constexpr double kStep_s = 0.1;
+    if (!(sample_s > 0))
+        throw std::invalid_argument(
+            fmt::format("levelling: {:g} s between samples found, expected above 0", sample_s));
+    return static_cast<std::uint32_t>(std::max(1.0, std::round(kStep_s / sample_s)));
+}
 
 PositionLeveller::PositionLeveller(const LevellingSettings& settings,
                                    const estimator::Settings& rig, double sample_s,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,10 @@
 #include "estimator/levelling/leveller.hpp"
 
 namespace vibrig::campaign {
+
+/// Samples per step of the loop, about 0.1 s; `sample_s`: between two of them. Throws
+/// std::invalid_argument where that is not above 0.
+[[nodiscard]] std::uint32_t levelling_block(double sample_s);
 
 /// Levels the platform at one position: the two channels are the platform directions normal to the
 /// position's nominal vertical. Control thread only.

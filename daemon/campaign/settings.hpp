@@ -68,7 +68,6 @@ struct LevellingSettings {
     double window_s = 10;           ///< of the means that the verdict rests on
     double tolerance_arcmin = 0.2;  ///< of both observables
     double torquer_limit_deg_h = 3000;
-    std::uint32_t block = 4;     ///< samples per step of the loop, about 0.1 s
     double slow_settling_s = 0;  ///< of the gains to go over to once settled; 0: stay fast
     double slow_ramp_s = 60;     ///< that it takes to go over
     /// "Message.Signal" of the base's velocity along the rig's north and east axes, m/s; both or

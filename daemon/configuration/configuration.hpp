@@ -19,6 +19,7 @@
 #include "estimator/filter/settings.hpp"
 #include "estimator/spectrum/mount.hpp"
 #include "estimator/spectrum/profile.hpp"
+#include "proto/sample_rate.hpp"
 
 namespace vibrig::configuration {
 
@@ -35,11 +36,14 @@ inline constexpr const char* kCommissionFolder = "/var/lib/vibrig/commission";
 struct Configuration {
     estimator::Settings
         estimator;  ///< [site] [vibration] [platform] [accelerometer] [noise] [estimator]
-    campaign::Settings campaign;           ///< [campaign], [shaker.limits]
-    drivers::CanPortSettings can;          ///< [can]
-    std::string dbc;                       ///< [can] dbc; empty: the built-in rig.dbc
-    drivers::AssemblerSettings assembler;  ///< [can.signals], [can] sample_rate_hz, deadlines
-    drivers::GimbalSettings gimbal;        ///< [gimbal]
+    campaign::Settings campaign;   ///< [campaign], [shaker.limits]
+    drivers::CanPortSettings can;  ///< [can]
+    std::string dbc;               ///< [can] dbc; empty: the built-in rig.dbc
+    /// [can.signals], [can] sample_rate_hz, deadlines
+    drivers::AssemblerSettings assembler{
+        .bindings = {},
+        .sample_period = static_cast<drivers::Time>(drivers::kSecond / kUnstatedSampleRate_hz)};
+    drivers::GimbalSettings gimbal;  ///< [gimbal]
     drivers::ShakerSettings
         shaker;  ///< [shaker], [shaker.registers]; scales in g peak, amplitude_unit folded in
     std::string shaker_plate;  ///< for the record

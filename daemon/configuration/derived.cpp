@@ -264,8 +264,6 @@ void derive_campaign(Configuration& c, const std::filesystem::path& folder, cons
     c.campaign.proof.demanded = c.proofs_demanded();
     c.campaign.watchdog_timeout_s = 3 * drivers::to_seconds(c.shaker.watchdog_period);
     c.campaign.sample_s = drivers::to_seconds(c.assembler.sample_period);
-    c.campaign.level.block =
-        static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.sample_s)));
     take_seen(c);
     c.campaign.swept_by.poll_s = drivers::to_seconds(c.shaker.poll_period);
     if (const auto& sweep = c.shaker.registers.sweep) {

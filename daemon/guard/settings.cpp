@@ -10,6 +10,7 @@
 
 #include "daemon/guard/keys.hpp"
 #include "daemon/guard/known_keys.hpp"
+#include "proto/sample_rate.hpp"
 
 namespace vibrig::guard {
 
@@ -109,7 +110,7 @@ void read_witness(Keys& keys, WitnessSettings& w) {
     };
     w.dbc = keys.text("can.dbc", w.dbc);
     keep_place("can.dbc");
-    w.sample_rate_hz = keys.number("can.sample_rate_hz", w.sample_rate_hz, 1, 10'000);
+    w.sample_rate_hz = keys.number("can.sample_rate_hz", kUnstatedSampleRate_hz, 1, 10'000);
     constexpr std::array<const char*, 3> kAxes{"accel_x", "accel_y", "accel_z"};
     for (std::size_t i = 0; i < 3; ++i) {
         const std::string key = std::string("can.signals.") + kAxes[i];

@@ -32,7 +32,7 @@ struct WitnessSettings {
     std::string table = "TableAccelerometer.Axial";
     std::array<double, 3> zero_g{};  ///< subtracted, then the matrix: raw to platform axes
     std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-    double sample_rate_hz = 40;
+    double sample_rate_hz = 0;     ///< to be stated
     double transmission = 0.6667;  ///< platform over table
     double seen = 1;               ///< by the platform's accelerometers, of a vibration's amplitude
     double window_s = safety::kRestWindow_s;

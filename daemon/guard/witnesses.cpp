@@ -10,6 +10,8 @@ namespace {
 /// At a low sample rate the window has to be longer to hold enough.
 double window_of(const WitnessSettings& settings) {
     constexpr double kSamples = 16;
+    if (!(settings.sample_rate_hz > 0))
+        throw SettingsError(told("can.sample_rate_hz", "none", "samples per second"));
     return std::max(settings.window_s, kSamples / settings.sample_rate_hz);
 }
 

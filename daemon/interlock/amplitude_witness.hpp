@@ -56,7 +56,7 @@ class AmplitudeWitness {
   public:
     struct Settings {
         double frequency_hz = 15;
-        drivers::Time sample_period = 25 * drivers::kMillisecond;
+        drivers::Time sample_period = 0;  ///< to be stated
         std::array<double, 3> zero_g{};
         std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
         /// Resolution of accelerometers x, y, z and the table's, g; 0: not known.
@@ -87,6 +87,7 @@ class AmplitudeWitness {
     static constexpr double kToleranceG = 0.02;
     static constexpr drivers::Time kCommandWindow = 500 * drivers::kMillisecond;
 
+    /// Throws std::invalid_argument without a sample period.
     explicit AmplitudeWitness(const Settings& settings);
     void begin() noexcept;  ///< excitation begins
     /// What it is to be at; from rest, as if excitation began.

@@ -13,7 +13,7 @@ namespace vibrig::rt {
 class RandomBands {
   public:
     struct Settings {
-        double sample_hz = 40;
+        double sample_hz = 0;  ///< to be stated
         /// Square of the PSD's integral over the integral of its square: 2 B_e values in a second
         /// are independent, however many are taken.
         double bandwidth_hz = 0;

@@ -18,7 +18,7 @@ class RandomWitness {
   public:
     /// Of one profile; see RandomBands::Settings.
     struct Settings {
-        double sample_hz = 40;
+        double sample_hz = 0;  ///< to be stated
         double table_bandwidth_hz = 0, platform_bandwidth_hz = 0;
         std::array<double, 3> zero_g{};  ///< taken off the raw accelerometers
     };

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <stdexcept>
 
 #include "drivers/sample/assembler.hpp"
 
@@ -45,6 +46,8 @@ StageFeed::Layout StageFeed::bind(const proto::Dbc& dbc, const char* key,
 StageFeed::StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings,
                      drivers::Waiter* control)
     : settings_(settings), control_(control) {
+    if (settings_.block == 0)
+        throw std::invalid_argument("stage feed: block: found 0 samples, expected 1 at least");
     if (settings_.increments) {
         gyro_ = bind(dbc, "zeroing.gyro_message", settings_.gyro_message);
         accelerometer_ =

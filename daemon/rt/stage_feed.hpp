@@ -51,7 +51,7 @@ struct StageFeedSettings {
     drivers::Time increment_period = 10 * drivers::kMillisecond;
     /// Carries Torquing and TorqueEcho; what the DBC does not have is not bound.
     std::string status_message = "GimbalStatus";
-    std::uint32_t block = 4;  ///< samples per mean
+    std::uint32_t block = 0;  ///< samples per mean; to be stated
     /// "Message.Signal" of the base's velocity, m/s; empty: the base stands.
     std::array<std::string, 2> velocity;
 };
@@ -64,7 +64,7 @@ class StageFeed {
     /// watched: samples, of whose coming the control thread is not told.
     enum class Mode : std::uint8_t { off, force, increments, samples, watched };
 
-    /// Throws BindingError; the Dbc must outlive this.
+    /// Throws BindingError, std::invalid_argument without a block; the Dbc must outlive this.
     StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings, drivers::Waiter* control);
 
     /// Acquisition thread. True: the frame is an increment's, and nobody else's.

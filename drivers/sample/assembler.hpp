@@ -63,7 +63,7 @@ struct SignalBindings {
 
 struct AssemblerSettings {
     SignalBindings bindings;
-    Time sample_period = 25 * kMillisecond;  ///< nominal, of one sync count
+    Time sample_period = 0;  ///< nominal, of one sync count; to be stated
     Time join_deadline =
         20 *
         kMillisecond;  ///< a sample is given out, complete or not, this long after its first frame

@@ -43,7 +43,9 @@ void reaction(benchmark::State& state, bool hanging) {
     auto settings = drivers::test::settings_for(server);
     settings.poll_period = 2 * kMillisecond;  // soon another request hangs
     const auto shaker = drivers::make_shaker(clock, settings);
-    rt::Interlock interlock(*shaker, *control, {12.0});
+    rt::Interlock interlock(
+        *shaker, *control,
+        {.table_g = 12.0, .witness = {.sample_period = 25 * drivers::kMillisecond}});
     std::atomic<Time> written{0};
     shaker->on_reading([&] { control->notify(); });
     shaker->on_stop_written([&] {
@@ -156,7 +158,8 @@ void estimate(benchmark::State& state) {
     rt::RealClock clock;
     const auto control = clock.make_waiter(), estimator_waiter = clock.make_waiter();
     FakeShaker shaker;
-    rt::Interlock interlock(shaker, *control, {12.0});
+    rt::Interlock interlock(shaker, *control,
+                            {.table_g = 12.0, .witness = {.sample_period = kPeriod}});
     interlock.guard(rt::Guard::excitation);
     rt::Ring<drivers::Sample> ring(4096);
     rt::Ring<rt::Fed> fed(4096);

@@ -22,7 +22,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     using namespace vibrig;
     static const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
     std::uint64_t samples = 0;
-    drivers::SampleAssembler assembler(dbc, {}, [&samples](const drivers::Sample& sample) {
+    drivers::AssemblerSettings settings;
+    settings.sample_period = 25 * drivers::kMillisecond;
+    drivers::SampleAssembler assembler(dbc, settings, [&samples](const drivers::Sample& sample) {
         ++samples;
         for (std::size_t i = 0; i < 3; ++i) {
             check(!sample.angles_good() || std::isfinite(sample.angle[i]));

@@ -60,7 +60,7 @@ rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
     feed.increments = settings.zeroing;
     feed.gyro_message = settings.zero.gyro_message;
     feed.accelerometer_message = settings.zero.accelerometer_message;
-    feed.block = settings.level.block;
+    feed.block = levelling_block(settings.sample_s);
     if (settings.levelling)
         feed.velocity = {settings.level.velocity_north, settings.level.velocity_east};
     return feed;

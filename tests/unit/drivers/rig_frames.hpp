@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/can/can_port.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::test {
@@ -73,6 +74,13 @@ inline std::vector<drivers::ReceivedFrame> frames_of_count(std::uint32_t count,
 }
 
 inline constexpr drivers::Time kPeriod = 25 * drivers::kMillisecond;
+
+/// Of samples that come so.
+inline drivers::AssemblerSettings rig_settings() {
+    drivers::AssemblerSettings settings;
+    settings.sample_period = kPeriod;
+    return settings;
+}
 /// Half a unit of the encoders (2^-20 turn) and accelerometers (2^-18 g), plus rounding of doubles.
 inline constexpr double kHalfUnitRad = 3.141592653589793 / (1 << 20) * 1.001;
 inline constexpr double kHalfUnitG = 0.5 / (1 << 18) * 1.001;

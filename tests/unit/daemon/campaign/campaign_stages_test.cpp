@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
@@ -366,6 +367,12 @@ TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {
     ASSERT_NE(torque, (std::array<double, 3>{}));
     EXPECT_TRUE(campaign->command({Kind::abort, "Ada", ""}, now).accepted);
     EXPECT_EQ(torque, (std::array<double, 3>{}));
+}
+
+TEST_F(StagesTest, ACampaignHasNoRateThatNobodyStated) {
+    settings.sample_s = 0;
+    const Ports ports{rig_port, dwell_port, log_port};
+    EXPECT_THROW(Campaign(settings, ports), std::invalid_argument);
 }
 
 }  // namespace

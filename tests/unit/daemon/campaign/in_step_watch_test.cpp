@@ -242,7 +242,7 @@ TEST(InStepWatch, ReadsSamplesOfWhoseComingNobodyIsTold) {
         bool wait_until(Time) noexcept override { return false; }
     } control;
     const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
-    rt::StageFeed feed(dbc, {}, &control);
+    rt::StageFeed feed(dbc, {.block = 4, .velocity = {}}, &control);
     drivers::Sample sample;
     sample.quality.fill(drivers::Quality::good);
     int came = 0;
@@ -268,7 +268,7 @@ struct InStepDwellTest : CampaignTest {
         }
         std::array<double, 2> grown_limits() const override { return test.limits; }
     } grown_rig{*this};
-    rt::StageFeed stage_feed{dbc, {}, nullptr};
+    rt::StageFeed stage_feed{dbc, {.block = 4, .velocity = {}}, nullptr};
     std::vector<std::optional<std::array<double, 2>>> grown;
     std::array<double, 2> limits{3, 3};
     double across = 0.01;

@@ -52,6 +52,7 @@ Ride ride(std::uint64_t seed, bool configured, bool moves, double lost_from_s = 
     LevellingSettings settings;
     estimator::Settings rig;
     rt::StageFeedSettings bound;
+    bound.block = levelling_block(kBaseSample_s);
     if (configured) {
         settings.velocity_north = bound.velocity[0] = "BaseVelocity.North";
         settings.velocity_east = bound.velocity[1] = "BaseVelocity.East";
@@ -145,6 +146,7 @@ TEST(MovingBase, WithoutItsConfiguredVelocityALevellingEndsAndSaysWhy) {
 TEST(MovingBase, OneComponentAloneAndUnknownSignalsAreRefusedWithTheKey) {
     const auto refusal = [](const std::string& north, const std::string& east) -> std::string {
         rt::StageFeedSettings settings;
+        settings.block = levelling_block(kBaseSample_s);
         settings.velocity = {north, east};
         try {
             const rt::StageFeed feed(moving_dbc(), settings, nullptr);

@@ -12,6 +12,13 @@ namespace {
 
 constexpr drivers::Time kPeriod = 25 * drivers::kMillisecond;
 
+/// Of samples that come so.
+WitnessSettings stated() {
+    WitnessSettings settings;
+    settings.sample_rate_hz = 1 / drivers::to_seconds(kPeriod);
+    return settings;
+}
+
 /// Frames as the rig sends them, by the codec.
 class Bus {
   public:
@@ -53,8 +60,12 @@ class Bus {
     proto::Dbc dbc_;
 };
 
+TEST(Witnesses, HaveNoRateThatNobodyStated) {
+    EXPECT_THROW(Witnesses{WitnessSettings{}}, SettingsError);
+}
+
 TEST(Witnesses, SeeThePlatformThroughItsTransmissionAndTheTableAsItIs) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     bus.shake(6, 4, 80);
     const auto sight = witnesses.sight(bus.now);
@@ -68,7 +79,7 @@ TEST(Witnesses, SeeThePlatformThroughItsTransmissionAndTheTableAsItIs) {
 
 /// Accelerometers that see 0.8 of an amplitude: of 6 g at the table and 4 at the platform 3.2.
 TEST(Witnesses, SeeThePlatformThroughItsAccelerometers) {
-    WitnessSettings settings;
+    WitnessSettings settings = stated();
     settings.seen = 0.8;
     Witnesses witnesses{settings};
     Bus bus(witnesses);
@@ -77,7 +88,7 @@ TEST(Witnesses, SeeThePlatformThroughItsAccelerometers) {
 }
 
 TEST(Witnesses, RestOnlyWhenAllOfThemDo) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     bus.shake(0, 0, 80);
     EXPECT_TRUE(witnesses.sight(bus.now).rests(safety::kRest_g));
@@ -111,7 +122,7 @@ Sight watched(Witnesses& witnesses, Bus& bus, double table_g, double shaker_g, d
 }
 
 TEST(Witnesses, ThatAreStuckWhileTheShakerSaysThatItShakesAreNotAtRest) {
-    WitnessSettings settings;
+    WitnessSettings settings = stated();
     settings.table.clear();
     Witnesses witnesses(settings);
     Bus bus(witnesses);
@@ -130,7 +141,7 @@ TEST(Witnesses, ThatAreStuckWhileTheShakerSaysThatItShakesAreNotAtRest) {
 
 TEST(Witnesses, OfTwoTheOneThatIsNotStuckDecides) {
     for (const bool table : {true, false}) {
-        Witnesses witnesses{WitnessSettings{}};
+        Witnesses witnesses{stated()};
         Bus bus(witnesses);
         const Shown stuck{.table_stuck = table, .platform_stuck = !table};
         // No word of the controller is needed: the other one moves.
@@ -145,7 +156,7 @@ TEST(Witnesses, OfTwoTheOneThatIsNotStuckDecides) {
 }
 
 TEST(Witnesses, WhatIsStillBecauseNothingShakesIsNotStuck) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     // GIVEN readings without any noise, at rest, shaken, at rest
     for (const double g : {0.0, 5.0, 0.0}) {
@@ -156,7 +167,7 @@ TEST(Witnesses, WhatIsStillBecauseNothingShakesIsNotStuck) {
 }
 
 TEST(Witnesses, OneThatIsSilentIsNotCalledStuck) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     watched(witnesses, bus, 5, 5, 2, {});
     for (int i = 0; i < 60; ++i) witnesses.doubt(bus.now += kPeriod, 5);
@@ -166,7 +177,7 @@ TEST(Witnesses, OneThatIsSilentIsNotCalledStuck) {
 }
 
 TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     for (int i = 0; i < 80; ++i) bus.sample(0, 0, bus.now += kPeriod, false);
     const auto sight = witnesses.sight(bus.now);
@@ -176,7 +187,7 @@ TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
 }
 
 TEST(Witnesses, ASilentBusIsNeitherRestNorMotion) {
-    Witnesses witnesses{WitnessSettings{}};
+    Witnesses witnesses{stated()};
     Bus bus(witnesses);
     bus.shake(5, 3, 80);
     const auto sight = witnesses.sight(bus.now + drivers::kSecond);
@@ -186,7 +197,7 @@ TEST(Witnesses, ASilentBusIsNeitherRestNorMotion) {
 }
 
 TEST(Witnesses, WithoutATableAccelerometerThePlatformIsTheWitness) {
-    WitnessSettings settings;
+    WitnessSettings settings = stated();
     settings.table.clear();
     Witnesses witnesses(settings);
     Bus bus(witnesses);
@@ -197,7 +208,7 @@ TEST(Witnesses, WithoutATableAccelerometerThePlatformIsTheWitness) {
 }
 
 TEST(Witnesses, WithoutAnyTheGuardRefusesToStart) {
-    WitnessSettings settings;
+    WitnessSettings settings = stated();
     settings.table.clear();
     settings.platform = {};
     EXPECT_THROW(Witnesses{settings}, SettingsError);
@@ -264,7 +275,7 @@ TEST(Witnesses, ADbcThatDoesNotFitIsToldWithThePlaceOfItsKey) {
 }
 
 TEST(Witnesses, GoByTheRigsTimeWhereItOwnsTheTime) {
-    WitnessSettings settings;
+    WitnessSettings settings = stated();
     settings.rig_time = true;
     Witnesses witnesses(settings);
     Bus bus(witnesses);

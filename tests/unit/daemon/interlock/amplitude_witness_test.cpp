@@ -58,6 +58,7 @@ struct WitnessedRig {
         Interlock::Limits limits;
         limits.table_g = 12;
         limits.witness.frequency_hz = t.frequency_hz;
+        limits.witness.sample_period = drivers::from_seconds(1 / t.sample_rate_hz);
         limits.witness.count_g.fill(kCount_g);
         limits.transmission = configured;
         return limits;
@@ -403,6 +404,10 @@ TEST(AmplitudeWitness, SeesTheAmplitudeAtAnyFrequencyAndRateThatAConfigurationMa
             EXPECT_GT(told, 0) << one.hz << " Hz at " << one.rate;
         }
     }
+}
+
+TEST(AmplitudeWitness, HasNoRateThatNobodyStated) {
+    EXPECT_THROW(AmplitudeWitness(AmplitudeWitness::Settings{}), std::invalid_argument);
 }
 
 /// A sweep at 6 g, 0.5 of it at the platform and 1 of it beyond 60 Hz; `scaled`: what the table

@@ -33,7 +33,8 @@ struct Rig {
     RealClock clock;
     std::unique_ptr<drivers::Waiter> control = clock.make_waiter();
     FakeShaker shaker;
-    drivers::SampleAssembler assembler{test::rig_dbc(), {}, [](const drivers::Sample&) {}};
+    drivers::SampleAssembler assembler{test::rig_dbc(), test::rig_settings(),
+                                       [](const drivers::Sample&) {}};
     drivers::Sample sample;
     drivers::PlatformStatus platform;
     std::unique_ptr<Interlock> interlock;
@@ -41,14 +42,16 @@ struct Rig {
     std::function<bool(const char* message)> sent = [](const char*) { return true; };
 
     explicit Rig(std::vector<Rule> rules) {
-        interlock = std::make_unique<Interlock>(
-            shaker, *control,
-            Interlock::Limits{kTable_g,
-                              500 * drivers::kMillisecond,
-                              std::move(rules),
-                              {.frequency_hz = 15.3, .count_g = {1e-4, 1e-4, 1e-4, 1e-4}},
-                              1,
-                              {{40, 100, 100}}});
+        interlock =
+            std::make_unique<Interlock>(shaker, *control,
+                                        Interlock::Limits{kTable_g,
+                                                          500 * drivers::kMillisecond,
+                                                          std::move(rules),
+                                                          {.frequency_hz = 15.3,
+                                                           .sample_period = test::kPeriod,
+                                                           .count_g = {1e-4, 1e-4, 1e-4, 1e-4}},
+                                                          1,
+                                                          {{40, 100, 100}}});
         sample.quality.fill(drivers::Quality::good);
         sample.force = {0, 1, 0};
         platform.loop_closed = true;

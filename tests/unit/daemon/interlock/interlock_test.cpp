@@ -16,11 +16,13 @@
 namespace vibrig::rt {
 namespace {
 
+constexpr drivers::Time kPeriod = 25 * drivers::kMillisecond;
+
 struct InterlockTest : testing::Test {
     RealClock clock;
     std::unique_ptr<drivers::Waiter> control = clock.make_waiter();
     FakeShaker shaker;
-    Interlock interlock{shaker, *control, {12.0}};
+    Interlock interlock{shaker, *control, {.table_g = 12.0, .witness = {.sample_period = kPeriod}}};
     drivers::Sample sample;
     drivers::PlatformStatus platform;
 
@@ -101,7 +103,7 @@ TEST_F(InterlockTest, MotionThatNobodyCommandedWaitsForNoRowsDwell) {
     auto rules = default_interlock();
     for (Rule& rule : rules)
         if (rule.condition == Trip::uncommanded) rule.dwell_s = 1;
-    Interlock slow{shaker, *control, {12.0, drivers::kSecond, rules}};
+    Interlock slow{shaker, *control, {12.0, drivers::kSecond, rules, {.sample_period = kPeriod}}};
     slow.uncommanded();
     EXPECT_EQ(slow.tripped(), Trip::uncommanded);
     EXPECT_EQ(slow.name_of(slow.latched()), "uncommanded");
@@ -131,7 +133,8 @@ TEST(TrippedValue, HasCauseRowAndValueOfOneTripWhoeverReadsWhenever) {
                         {12.0,
                          drivers::kSecond,
                          {{"far", Trip::amplitude_off, Reaction::abort, 1, 0, true},
-                          {"hot", Trip::temperature, Reaction::abort, 70, 0, true}}});
+                          {"hot", Trip::temperature, Reaction::abort, 70, 0, true}},
+                         {.sample_period = kPeriod}});
     interlock.guard(Guard::armed);
     interlock.command(1, {0, 0, 0});
     std::atomic<bool> over{false};
@@ -193,7 +196,9 @@ struct TableTest : testing::Test {
 
     void make(std::vector<Rule> rules) {
         interlock = std::make_unique<Interlock>(
-            shaker, *control, Interlock::Limits{12.0, drivers::kSecond, std::move(rules)});
+            shaker, *control,
+            Interlock::Limits{
+                12.0, drivers::kSecond, std::move(rules), {.sample_period = kPeriod}});
         sample.quality.fill(drivers::Quality::good);
         sample.force = {0, 1, 0};
         sample.time = 10 * drivers::kSecond;
@@ -202,7 +207,7 @@ struct TableTest : testing::Test {
         interlock->guard(Guard::excitation);
     }
     void next() {
-        sample.time += 25 * drivers::kMillisecond;
+        sample.time += kPeriod;
         interlock->check(sample, platform);
     }
     /// Vibration of 6 g along a vertical and of 6 g * share across it.
@@ -358,7 +363,8 @@ TEST(Reaction, TheStopIsTheNextWriteAndNoSetPointFollows) {
     auto settings = drivers::test::settings_for(server);
     settings.response_timeout = 60 * drivers::kSecond;
     const auto shaker = drivers::make_shaker(clock, settings);
-    Interlock interlock(*shaker, *control, {12.0});
+    Interlock interlock(*shaker, *control,
+                        {.table_g = 12.0, .witness = {.sample_period = kPeriod}});
     shaker->on_reading([&] { control->notify(); });
     shaker->on_stop_written([&] { interlock.stop_written(); });
     shaker->start([] { return true; }, [](drivers::LinkState, const char*) {});

@@ -150,6 +150,7 @@ TEST(RandomBands, NoNumberIsWrongAndBeginForgets) {
     EXPECT_EQ(bands.add(10), Finding::none);
     EXPECT_EQ(bands.ratio(), 0);
     EXPECT_THROW(Bands({40, 0, 1}), std::invalid_argument);
+    EXPECT_THROW(Bands({.bandwidth_hz = 117, .mean_square = 1}), std::invalid_argument);
     EXPECT_THROW(Bands({40, 100, 0}), std::invalid_argument);
 }
 

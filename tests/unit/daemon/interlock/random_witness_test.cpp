@@ -208,6 +208,11 @@ INSTANTIATE_TEST_SUITE_P(Rates, RandomWitnessAt, testing::Values(40, 2000), [](c
     return std::to_string(static_cast<int>(one.param));
 });
 
+TEST(RandomWitness, HasNoRateThatNobodyStated) {
+    const RandomWitness::Settings unstated{.table_bandwidth_hz = 117, .platform_bandwidth_hz = 117};
+    EXPECT_THROW(RandomWitness{unstated}, std::invalid_argument);
+}
+
 TEST(RandomWitness, TheMeanThatShowsGravityFollowsFromTheLevel) {
     const RandomWitness slow({40, 117, 117}), fast({2000, 117, 117});
     // (16 rms)^2 values: 1024 of 2 g, over 2 tau n'.

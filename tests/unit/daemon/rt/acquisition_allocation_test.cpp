@@ -49,7 +49,8 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     const auto control = clock.make_waiter();
     const auto estimator_waiter = clock.make_waiter();
     FakeShaker shaker;
-    Interlock interlock(shaker, *control, {12.0});
+    Interlock interlock(shaker, *control,
+                        {.table_g = 12.0, .witness = {.sample_period = 2 * kMillisecond}});
     interlock.guard(Guard::excitation);
     Ring<drivers::Sample> ring(4096);
     estimator::Identification identification{estimator::Settings{}};
@@ -63,6 +64,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     settings.sample_period = 2 * kMillisecond;  // faster than life, to be done soon
     StageFeedSettings with_increments;
     with_increments.increments = true;
+    with_increments.block = 4;
     StageFeed stages(dbc, with_increments, control.get());
     Ring<FrameRecord> recorder_frames(1024);  // nobody takes: what does not fit is dropped
     Ring<drivers::Sample> recorder_samples(1024);

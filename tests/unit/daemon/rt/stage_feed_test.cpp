@@ -36,7 +36,9 @@ drivers::ReceivedFrame frame_of(const proto::Dbc& dbc, const char* message,
 TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {
     const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
     StageFeedSettings settings;
+    EXPECT_THROW(StageFeed(dbc, settings, nullptr), std::invalid_argument);
     settings.increments = true;
+    settings.block = 4;
     StageFeed feed(dbc, settings, nullptr);
     drivers::Sample sample;
     feed.take(sample);

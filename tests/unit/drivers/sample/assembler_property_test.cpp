@@ -87,7 +87,8 @@ TEST_P(AssemblerUnderTrouble, KeepsOrderValuesTimesAndCounts) {
 
         // WHEN the frames come as they come, with deadlines served now and then
         std::vector<Sample> samples;
-        SampleAssembler assembler(rig_dbc(), {}, [&](const Sample& s) { samples.push_back(s); });
+        SampleAssembler assembler(rig_dbc(), rig_settings(),
+                                  [&](const Sample& s) { samples.push_back(s); });
         for (const ReceivedFrame& frame : traffic.frames) {
             if (random() % 4 == 0)
                 assembler.advance(std::min(frame.time, assembler.next_deadline()));
@@ -176,7 +177,8 @@ TEST(AssemblerUnderGarbage, SurvivesRandomFramesOnItsOwnIds) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937 random(seed);
     std::vector<Sample> samples;
-    SampleAssembler assembler(rig_dbc(), {}, [&](const Sample& s) { samples.push_back(s); });
+    SampleAssembler assembler(rig_dbc(), rig_settings(),
+                              [&](const Sample& s) { samples.push_back(s); });
     for (std::uint32_t count = 0; count < 2000; ++count) {
         for (const ReceivedFrame& good : frames_of_count(count, kStart + count * kPeriod)) {
             assembler.feed(good);

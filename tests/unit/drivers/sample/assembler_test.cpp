@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 class Assembler : public ::testing::Test {
   protected:
-    explicit Assembler(AssemblerSettings settings = {}) { make(settings); }
+    explicit Assembler(AssemblerSettings settings = rig_settings()) { make(settings); }
     void make(const AssemblerSettings& settings, const proto::Dbc& dbc = rig_dbc()) {
         samples_.reserve(10'000);
         assembler_ = std::make_unique<SampleAssembler>(
@@ -76,7 +76,7 @@ TEST_F(Assembler, KeepsCountAcrossTheWrapsOfSyncLowAndOfTheCounter) {
         expect_good(s, 200 + static_cast<std::uint32_t>(&s - samples_.data()));
     ASSERT_EQ(samples_.size(), 600u);
     samples_.clear();
-    make({});
+    make(rig_settings());
     std::uint32_t count = std::numeric_limits<std::uint32_t>::max() - 20;
     for (Time t = kSecond; t < 2 * kSecond; t += kPeriod, ++count) {
         for (const ReceivedFrame& f : frames_of_count(count, t)) assembler_->feed(f);
@@ -203,7 +203,7 @@ TEST_F(Assembler, MarksWhatTheDeviceFlagsAndWhatIsOutOfRange) {
     // GIVEN the inner resolver flagged invalid, x saturated beyond the DBC's range of 31 g, y
     // inside
     const proto::Dbc dbc = rig_dbc();
-    make({}, dbc);
+    make(rig_settings(), dbc);
     frames[1] = frame_of(
         dbc, "Resolvers", time_of(1),
         {{"Outer", 1}, {"Inner", 2}, {"OuterValid", 1}, {"InnerValid", 0}, {"SyncLow", 1}});
@@ -229,7 +229,7 @@ TEST_F(Assembler, WrapsAnglesIntoOneTurn) {
                 s.offset = -360, s.minimum = -360, s.maximum = 720;
         }
     }
-    make({}, dbc);
+    make(rig_settings(), dbc);
     std::vector<ReceivedFrame> frames = frames_of_count(1, time_of(1));
     frames[1] = frame_of(
         dbc, "Resolvers", time_of(1),
@@ -334,7 +334,7 @@ TEST_F(Assembler, FollowsThePlatformAndItsGimbals) {
 
 TEST_F(Assembler, WorksWithoutASyncCounter) {
     // GIVEN a lab whose devices have none
-    AssemblerSettings settings;
+    AssemblerSettings settings = rig_settings();
     settings.bindings.sync_count = "";
     make(settings);
     for (std::uint32_t count = 50; count < 60; ++count) {
@@ -356,7 +356,7 @@ TEST_F(Assembler, WorksWithoutASyncCounter) {
 }
 
 TEST_F(Assembler, PutsFramesWithoutSyncLowWithTheNewestCount) {
-    AssemblerSettings settings;
+    AssemblerSettings settings = rig_settings();
     settings.bindings.message_sync_signal = "";
     make(settings);
     for (std::uint32_t count = 50; count < 60; ++count) feed(count);
@@ -365,7 +365,7 @@ TEST_F(Assembler, PutsFramesWithoutSyncLowWithTheNewestCount) {
 }
 
 TEST_F(Assembler, LeavesUnboundChannelsUnbound) {
-    AssemblerSettings settings;
+    AssemblerSettings settings = rig_settings();
     settings.bindings.table_accel = "";
     settings.bindings.outer_valid = "";
     make(settings);
@@ -392,7 +392,7 @@ TEST_F(Assembler, AllocatesNothingOnceBuilt) {
 
 TEST(AssemblerBindings, NameTheKeyTheValueAndWhatThereIs) {
     const auto message_of = [](const std::function<void(SignalBindings&)>& spoil) {
-        AssemblerSettings settings;
+        AssemblerSettings settings = rig_settings();
         spoil(settings.bindings);
         try {
             const SampleAssembler assembler(rig_dbc(), settings, {});
@@ -421,7 +421,7 @@ TEST(AssemblerBindings, DoNotAskForTemperaturesThatNobodyNamed) {
     // GIVEN a DBC without the message of the temperatures
     proto::Dbc dbc = rig_dbc();
     std::erase_if(dbc.messages, [](const auto& m) { return m.name == "PlatformTemperatures"; });
-    AssemblerSettings settings;
+    AssemblerSettings settings = rig_settings();
     // THEN it is bound without them, unless one is named
     EXPECT_NO_THROW(SampleAssembler(dbc, settings, {}));
     settings.bindings.temperature_case = "Temperatures.Case";
@@ -429,7 +429,7 @@ TEST(AssemblerBindings, DoNotAskForTemperaturesThatNobodyNamed) {
 }
 
 TEST(AssemblerBindings, NameAllThatIsMissingAtOnce) {
-    AssemblerSettings settings;
+    AssemblerSettings settings = rig_settings();
     settings.bindings.outer = "Angles.Alpha";
     settings.bindings.fault = "State.Broken";
     settings.bindings.accel_z_valid = "AccelerometerZ.Good";
@@ -451,9 +451,19 @@ TEST(AssemblerBindings, RefuseSettingsThatCannotWork) {
              [](auto& s) { s.open_samples = 0; }, [](auto& s) { s.open_samples = 65; },
              [](auto& s) { s.sample_period = 0; }, [](auto& s) { s.join_deadline = -1; },
              [](auto& s) { s.stale_deadline = 0; }}) {
-        AssemblerSettings settings;
+        AssemblerSettings settings = rig_settings();
         spoil(settings);
         EXPECT_THROW(SampleAssembler(rig_dbc(), settings, {}), BindingError);
+    }
+    EXPECT_NO_THROW(SampleAssembler(rig_dbc(), rig_settings(), {}));
+}
+
+TEST(AssemblerSettings, HaveNoRateThatNobodyStated) {
+    try {
+        const SampleAssembler assembler(rig_dbc(), {}, {});
+        ADD_FAILURE() << "no error";
+    } catch (const BindingError& error) {
+        EXPECT_EQ(error.key(), "can.sample_period");
     }
 }
 

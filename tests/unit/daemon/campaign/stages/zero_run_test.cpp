@@ -14,7 +14,7 @@ constexpr std::uint16_t kIdle = 0, kRunning = 2, kFault = 4;
 
 /// A controller with a watchdog of its own, a chain and what is wrong with them; the table stands.
 struct ZeroRunTest : CampaignTest {
-    rt::StageFeed feed{dbc, rt::StageFeedSettings{}, nullptr};
+    rt::StageFeed feed{dbc, {.block = 4, .velocity = {}}, nullptr};
     // its truth
     bool fires = true, fires_if_linked = true, fires_if_unlinked = true;
     bool stays = true;  ///< after its watchdog has fired
