@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <sstream>
 #include <stdexcept>
 
 #include "daemon/allan/column_file.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -197,7 +197,6 @@ void check_range(const AllanRequest& request, const std::vector<double>& values)
 }  // namespace
 
 double to_deg_per_hour(const std::string& unit, bool phase) {
-    constexpr double kArcsecPerRad = 3600 * 180 / std::numbers::pi;
     if (unit.empty() || unit == (phase ? "arcsec" : "deg/h")) {
         return 1;
     }
@@ -205,7 +204,7 @@ double to_deg_per_hour(const std::string& unit, bool phase) {
         return 3600;
     }
     if (unit == (phase ? "rad" : "rad/s")) {
-        return kArcsecPerRad;
+        return 1 / estimator::kRadPerArcsec;
     }
     throw std::runtime_error("--unit: \"" + unit + "\" found, expected " +
                              (phase ? "arcsec, deg or rad" : "deg/h, deg/s or rad/s"));

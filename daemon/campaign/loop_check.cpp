@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/interlock/amplitude_witness.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::campaign {
 
@@ -96,7 +97,7 @@ std::string LoopCheck::look(std::array<double, 3>& position_deg) const {
                     std::abs(reading.force_g[i] - mean[i]), kStill);
         }
     }
-    for (std::size_t i = 0; i < 3; ++i) position_deg[i] = angle_rad_[i] * 180 / std::numbers::pi;
+    for (std::size_t i = 0; i < 3; ++i) position_deg[i] = angle_rad_[i] * estimator::kDegPerRad;
     return {};
 }
 
@@ -252,9 +253,7 @@ void LoopCheck::row(const char* name, const char* unit, double value, double low
 
 /// A platform that turns with the vibration has gravity go across its vertical, 1 g times the
 /// angle.
-double LoopCheck::most_in_step() const {
-    return settings_.cross_share * 180 * 3600 / std::numbers::pi;
-}
+double LoopCheck::most_in_step() const { return settings_.cross_share / estimator::kRadPerArcsec; }
 
 LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double low, double high) {
     const auto found = estimator::loop_response(readings_, hz);

@@ -7,13 +7,15 @@
 #include <stdexcept>
 #include <utility>
 
+#include "estimator/filter/angles.hpp"
+
 namespace vibrig::campaign {
 
 namespace level = estimator::levelling;
 
 namespace {
 
-constexpr double kSmallAngle = 5 * level::kPi / 180;
+constexpr double kSmallAngle = 5 * estimator::kRadPerDeg;
 
 level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Settings& rig,
                                 double sample_s, double torquer_limit_deg_h) {
@@ -28,12 +30,13 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
     const std::uint32_t block = levelling_block(sample_s);
     loop.period_s = block * sample_s;
     loop.window_s = s.window_s;
-    loop.tolerance_rad = s.tolerance_arcmin * level::kArcmin;
-    loop.torquer_limit = std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * level::kDegPerHour;
+    loop.tolerance_rad = s.tolerance_arcmin * estimator::kRadPerArcmin;
+    loop.torquer_limit =
+        std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * estimator::kDegPerHour;
     loop.noise.accelerometer_mps2 =
         rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(block));
     if (!s.velocity_north.empty()) loop.noise.reference_mps = s.velocity_noise_mps;
-    loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * level::kPi / 180 / 60;
+    loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * estimator::kDegPerRootHour;
     return loop;
 }
 
@@ -64,8 +67,8 @@ std::string PositionLeveller::refusal() const {
         "levelling.tolerance_arcmin: found {:g}, expected at least {:.3g} with levelling.window_s "
         "= {:g} and noise.accelerometer_g = {:g} (four times the noise of the mean specific "
         "force){}",
-        settings_.tolerance_arcmin, loop.tolerance_needed() / level::kArcmin, settings_.window_s,
-        rig_.accelerometer_g,
+        settings_.tolerance_arcmin, loop.tolerance_needed() / estimator::kRadPerArcmin,
+        settings_.window_s, rig_.accelerometer_g,
         window ? fmt::format(", or levelling.window_s of at least {:.3g}", *window) : "");
 }
 
@@ -103,7 +106,7 @@ Vector PositionLeveller::to_axes(const level::Pair& rate) const {
     // takes the first down, and one about the first takes the second up.
     Vector axes{};
     for (std::size_t i = 0; i < 3; ++i) {
-        axes[i] = (rate[0] * channel_[1][i] - rate[1] * channel_[0][i]) / level::kDegPerHour;
+        axes[i] = (rate[0] * channel_[1][i] - rate[1] * channel_[0][i]) / estimator::kDegPerHour;
     }
     return axes;
 }
@@ -152,7 +155,7 @@ std::string PositionLeveller::failure() const {
         why += fmt::format(
             "; it was {:.3g} deg at first and grows under the torquing: sign or axes of the "
             "torquers",
-            largest_at_first_ * 180 / level::kPi);
+            largest_at_first_ * estimator::kDegPerRad);
     }
     return why;
 }
@@ -163,11 +166,13 @@ std::string PositionLeveller::words() const {
     std::string text = fmt::format(
         "level after {:.1f} s: mean specific force {:+.3f}' and {:+.3f}', tolerance {:.3g}'; drift "
         "{:+.3f} and {:+.3f} deg/h",
-        l.settled_s().value_or(l.time_s()), l.observables().force_rad[0] / level::kArcmin,
-        l.observables().force_rad[1] / level::kArcmin, l.tolerance() / level::kArcmin,
-        drift[0] / level::kDegPerHour, drift[1] / level::kDegPerHour);
+        l.settled_s().value_or(l.time_s()), l.observables().force_rad[0] / estimator::kRadPerArcmin,
+        l.observables().force_rad[1] / estimator::kRadPerArcmin,
+        l.tolerance() / estimator::kRadPerArcmin, drift[0] / estimator::kDegPerHour,
+        drift[1] / estimator::kDegPerHour);
     if (limit_rad_ > 0)
-        text += fmt::format("; {:.3g}' (1 sigma) from the zeros", limit_rad_ / level::kArcmin);
+        text += fmt::format("; {:.3g}' (1 sigma) from the zeros",
+                            limit_rad_ / estimator::kRadPerArcmin);
     if (const auto note = l.message(); !note.empty()) text += "; " + note;
     return text;
 }
@@ -178,8 +183,8 @@ LevelDrift PositionLeveller::drift(const Vector& encoder_rad) const {
     found.direction = channel_;
     // The torquers held against it; see to_axes().
     const auto torqued = leveller_->drift();
-    found.rate_deg_h = {torqued[1] / level::kDegPerHour, -torqued[0] / level::kDegPerHour};
-    found.sigma_deg_h = leveller_->drift_sigma() / level::kDegPerHour;
+    found.rate_deg_h = {torqued[1] / estimator::kDegPerHour, -torqued[0] / estimator::kDegPerHour};
+    found.sigma_deg_h = leveller_->drift_sigma() / estimator::kDegPerHour;
     return found;
 }
 
@@ -189,14 +194,14 @@ void PositionLeveller::fill(LevellingStatus& status) const {
     status.verdict = level::name_of(l.verdict());
     status.time_s = l.settled_s().value_or(l.time_s());
     for (std::size_t i = 0; i < 2; ++i) {
-        status.tilt_arcmin[i] = l.observables().force_rad[i] / level::kArcmin;
-        status.to_come_arcmin[i] = l.observables().rate_rad[i] / level::kArcmin;
-        status.drift_deg_h[i] = l.drift()[i] / level::kDegPerHour;
+        status.tilt_arcmin[i] = l.observables().force_rad[i] / estimator::kRadPerArcmin;
+        status.to_come_arcmin[i] = l.observables().rate_rad[i] / estimator::kRadPerArcmin;
+        status.drift_deg_h[i] = l.drift()[i] / estimator::kDegPerHour;
     }
     status.phase = l.verdict() == level::Verdict::settled && loop_.slow ? "ramp" : "fast";
-    status.tolerance_arcmin = l.tolerance() / level::kArcmin;
-    status.noise_arcmin = l.budget().total / level::kArcmin;
-    status.limit_arcmin = limit_rad_ / level::kArcmin;
+    status.tolerance_arcmin = l.tolerance() / estimator::kRadPerArcmin;
+    status.noise_arcmin = l.budget().total / estimator::kRadPerArcmin;
+    status.limit_arcmin = limit_rad_ / estimator::kRadPerArcmin;
     status.done = done_;
     status.message = failure();
     if (status.message.empty()) status.message = l.message();

@@ -18,7 +18,6 @@ namespace {
 
 using estimator::kRadPerDeg;
 
-constexpr double kArcsec = kRadPerDeg / 3600;
 constexpr double kSureness = 3;  // standard deviations
 // The gimbals take the shorter way round, and of half a turn neither way is the shorter: what a
 // slew ends beside its target would decide. 2 deg short of it at either end, it is decided.
@@ -250,7 +249,8 @@ std::string ZeroCalibration::words() const {
     if (results_.size() > 1) {
         text += fmt::format(
             "; apart from them: misalignment {:+.1f} and {:+.1f} arcsec, scale of z {:+.1f} ppm",
-            last_.misalignment[0] / kArcsec, last_.misalignment[1] / kArcsec, 1e6 * last_.scale_z);
+            last_.misalignment[0] / estimator::kRadPerArcsec,
+            last_.misalignment[1] / estimator::kRadPerArcsec, 1e6 * last_.scale_z);
     } else {
         text += "; x and y: zero + 1 g x misalignment; z: zero + 1 g x scale error";
     }

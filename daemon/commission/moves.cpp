@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/commission/procedure.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::commission {
 
@@ -24,7 +25,7 @@ constexpr double kSlewShare = 0.02;  // ratios agree to it
 /// Of a force of 1 g, at least: where an accelerometer is dead the rest turns less.
 double turned_deg(const Vec3& a, const Vec3& b) {
     const double chord = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-    return 2 * 57.29577951 * std::asin(std::min(1.0, chord / 2));
+    return 2 * estimator::kDegPerRad * std::asin(std::min(1.0, chord / 2));
 }
 
 /// First differences: what is wanted is the noise, not the drift of a free platform.

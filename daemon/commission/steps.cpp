@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "daemon/commission/procedure.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::commission {
 
@@ -212,7 +213,8 @@ void Procedure::hand_moved() {
     channel_of_[slot_] = most;
     travel_[slot_] = kLast_deg;
     said_[slot_] = static_cast<int>(slot_);
-    respond_[slot_] = norm(difference(mean_.force, before_.force)) / (kLast_deg * 0.01745329252);
+    respond_[slot_] =
+        norm(difference(mean_.force, before_.force)) / (kLast_deg * estimator::kRadPerDeg);
     tell(fmt::format("B  {} follows the {} gimbal", names_.angle[most], kLoudNames[slot_]));
     next_gimbal();
 }
@@ -285,8 +287,8 @@ void Procedure::small_moved() {
                                     names_.angle[c], kLoudNames[slot_], step[0], step[1], step[2]),
                         {key_of(c), "can.dbc"});
     ratio_[c] = ratio;
-    respond_[slot_] =
-        norm(difference(small_.back().force, small_.front().force)) / (kLast_deg * 0.01745329252);
+    respond_[slot_] = norm(difference(small_.back().force, small_.front().force)) /
+                      (kLast_deg * estimator::kRadPerDeg);
     confirm_name();
 }
 

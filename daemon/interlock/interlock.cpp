@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "estimator/filter/angles.hpp"
+
 namespace vibrig::rt {
 
 using drivers::Channel;
@@ -60,7 +62,7 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
 
 void Interlock::command(double table_g, const std::array<double, 3>& position_deg) noexcept {
     for (std::size_t i = 0; i < 3; ++i)
-        position_rad_[i].store(position_deg[i] * std::numbers::pi / 180);
+        position_rad_[i].store(position_deg[i] * estimator::kRadPerDeg);
     position_known_.store(true);
     commanded_g_.store(table_g);
 }
@@ -243,7 +245,7 @@ void Interlock::check_motion(const drivers::Sample& sample) noexcept {
                 std::remainder(sample.angle[i] - position_rad_[i].load(), 2 * std::numbers::pi);
             farthest = std::isnan(off) ? off : std::max(farthest, std::abs(off));
         }
-        judge(By::sample, Trip::gimbal_off, farthest * 180 / std::numbers::pi, sample.time);
+        judge(By::sample, Trip::gimbal_off, farthest * estimator::kDegPerRad, sample.time);
     }
     if (!sample.force_good()) return;
     // Samples near a multiple of the rate show a vibration as a force that stands, which is none.

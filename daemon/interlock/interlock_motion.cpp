@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::rt {
 
@@ -54,7 +55,7 @@ double MotionMonitor::tilt_deg() const noexcept {
     const double cross =
         std::hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
     const double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    return std::atan2(cross, dot) * 180 / std::numbers::pi;
+    return std::atan2(cross, dot) * estimator::kDegPerRad;
 }
 
 void LossMonitor::add(drivers::Time now, std::uint64_t samples, std::uint64_t incomplete,

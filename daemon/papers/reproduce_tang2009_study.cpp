@@ -4,10 +4,10 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
-#include <numbers>
 #include <thread>
 
 #include "daemon/results/progress.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/result.hpp"
@@ -125,7 +125,7 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed,
             estimator::Measurement m;
             m.time_s = sample.time_s;
             for (std::size_t k = 0; k < 3; ++k) {
-                m.angle_rad[k] = sample.readings.encoder_deg[k] * (std::numbers::pi / 180);
+                m.angle_rad[k] = sample.readings.encoder_deg[k] * estimator::kRadPerDeg;
                 m.force_g[k] = sample.readings.raw_g[k];
             }
             for (std::size_t r = 0; r < kRoutes; ++r) {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/level/paper_level.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "tests/plant/platform_model.hpp"
@@ -119,7 +120,7 @@ struct Levels {
 
 /// Noise-free dwell at a position at a0 = `amplitude` with these errors.
 Levels dwell(const Vec3& angles_deg, double amplitude, const Errors& e) {
-    const Vec3 angles = (std::numbers::pi / 180) * angles_deg;
+    const Vec3 angles = estimator::kRadPerDeg * angles_deg;
     const Vec3 u = plant::PlatformModel::to_platform(angles, {0, 1, 0});
     Vec3 seen = u;
     for (std::size_t i = 0; i < 3; ++i) {

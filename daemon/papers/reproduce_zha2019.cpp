@@ -7,6 +7,7 @@
 #include "daemon/papers/reproduce_zha2019_vehicle.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace vibrig::tool::zha2019 {
@@ -14,6 +15,8 @@ namespace vibrig::tool::zha2019 {
 namespace {
 
 using namespace estimator::levelling;
+using estimator::kDegPerHour;
+using estimator::kRadPerArcmin;
 
 constexpr double kSigma = 0.0088;
 constexpr double kDamping = 0.7;
@@ -26,7 +29,7 @@ SimulatedStart start(Network network, const Gains& gains, double tilt_arcmin, do
     scenario.loop.fast = gains;
     scenario.loop.settling_s = 600;
     scenario.loop.period_s = 0.1;
-    scenario.tilt = {tilt_arcmin * kArcmin, 0};
+    scenario.tilt = {tilt_arcmin * kRadPerArcmin, 0};
     scenario.duration_s = duration_s;
     return simulate(scenario);
 }
@@ -87,7 +90,7 @@ void add_settling(Reproduction& table) {
     schedule.loop.slow = Gains{7.68e-3, 6.68, 7.68e-3};
     schedule.loop.settling_s = 600;
     schedule.loop.period_s = 1;
-    schedule.tilt = {10 * kArcmin, 0};
+    schedule.tilt = {10 * kRadPerArcmin, 0};
     schedule.duration_s = 4 * kHour;
     table.add("time to 2 %, hold until settled, then ramp to slow gains", "-",
               printed("%.0f s", simulate(schedule).last_above(0.02)));
@@ -105,7 +108,7 @@ void add_other_start(Reproduction& table) {
         Scenario scenario = drives::start(drives::kWays[k], kPrinted, 2.6, 4 * kHour);
         scenario.start_velocity = {kVelocity_mps, 0};
         scenario.drift = {kDrift_deg_h * kDegPerHour, 0};
-        found[k] = simulate(scenario).tilt_deviation() / kArcmin;
+        found[k] = simulate(scenario).tilt_deviation() / kRadPerArcmin;
         agree = agree && near(found[k], kPublished[k], 0.01);
     }
     table.add(printed("the three of 2.6', printed gains, started %g m/s too fast, drift %g deg/h",
@@ -117,7 +120,7 @@ void add_other_start(Reproduction& table) {
 
 void add_four_hours(Reproduction& table) {
     const auto deviation = [](Network network, const Gains& gains) {
-        return start(network, gains, 2.6, 4 * kHour).tilt_deviation() / kArcmin;
+        return start(network, gains, 2.6, 4 * kHour).tilt_deviation() / kRadPerArcmin;
     };
     const Gains designed = gains_of(kSigma, kDamping);
     const double none = deviation(Network::undamped, designed);
@@ -156,7 +159,7 @@ std::array<double, 2> reductions(double tilt_arcmin, bool step, std::size_t seed
             scenario.loop.noise.reference_mps = 0.2;
             scenario.reference_error = {0.5, 0};
             scenario.reference_error_s = step ? 1 : 0;
-            scenario.tilt = {tilt_arcmin * kArcmin, 0};
+            scenario.tilt = {tilt_arcmin * kRadPerArcmin, 0};
             scenario.duration_s = 4 * kHour;
             scenario.seed = seed;
             sum[n] += simulate(scenario).tilt_deviation();

@@ -4,10 +4,13 @@
 #include <string>
 
 #include "daemon/papers/reproduce_zha2019_vehicle.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::tool::zha2019::drives {
 
 using namespace estimator::levelling;
+using estimator::kDegPerHour;
+using estimator::kRadPerArcmin;
 
 namespace {
 
@@ -28,7 +31,7 @@ void add_tilt(plot::Chart& chart, const std::string& name, const Scenario& scena
     for (const TracePoint& point : simulate(scenario).trace) {
         if (point.time_s < next) continue;
         next += step_s;
-        curve.add(point.time_s / 60, point.tilt[0] / kArcmin);
+        curve.add(point.time_s / 60, point.tilt[0] / kRadPerArcmin);
     }
     chart.curves.push_back(std::move(curve));
 }
@@ -47,7 +50,7 @@ plot::Chart networks_chart(const Gains& designed) {
             const Complex h = network(s);
             const Complex tilt =
                 (1.0 - h) * s / (earth.radius_m * (s * s + h * earth.schuler_squared()));
-            curve.add(period, std::abs(tilt) / kArcmin);
+            curve.add(period, std::abs(tilt) / kRadPerArcmin);
         }
         chart.curves.push_back(std::move(curve));
     };

@@ -7,10 +7,13 @@
 #include <string>
 
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::tool::zha2019::drives {
 
 using namespace estimator::levelling;
+using estimator::kDegPerHour;
+using estimator::kRadPerArcmin;
 
 namespace {
 
@@ -23,7 +26,7 @@ double deviation(const SimulatedStart& run, std::size_t channel) {
         sum += point.tilt[channel] / n;
         squares += point.tilt[channel] * point.tilt[channel] / n;
     }
-    return std::sqrt(std::max(0.0, squares - sum * sum)) / kArcmin;
+    return std::sqrt(std::max(0.0, squares - sum * sum)) / kRadPerArcmin;
 }
 
 /// East and north, arcmin.
@@ -78,7 +81,7 @@ Scenario start(const Way& way, const Gains& gains, double tilt_arcmin, double du
     scenario.loop.fast = gains;
     scenario.loop.settling_s = 600;
     scenario.loop.period_s = 1;
-    scenario.tilt = {tilt_arcmin * kArcmin, tilt_arcmin * kArcmin};
+    scenario.tilt = {tilt_arcmin * kRadPerArcmin, tilt_arcmin * kRadPerArcmin};
     scenario.duration_s = duration_s;
     return scenario;
 }
@@ -116,8 +119,8 @@ void add_vehicle(Reproduction& table) {
               {{"east", internal[0]}, {"north", internal[1]}});
     Scenario still = start(kWays[2], {kPrinted.k1, kPrinted.k2, 0}, 0, 2 * 3600);
     still.drift = {0.1 * kDegPerHour, 0};
-    const double tilt = simulate(still).trace.back().tilt[0] / kArcmin;
-    const double theory = steady_tilt(still.loop.fast, still.drift[0], 0) / kArcmin;
+    const double tilt = simulate(still).trace.back().tilt[0] / kRadPerArcmin;
+    const double theory = steady_tilt(still.loop.fast, still.drift[0], 0) / kRadPerArcmin;
     table.add("K3 = 0: tilt that a drift of 0.1 deg/h leaves (eq. 8)", "-", printed("%.4f'", tilt),
               std::abs(tilt - theory) <= 1e-3 * std::abs(theory), printed("%.4f'", theory),
               {{"computed", tilt}, {"theory", theory}});

@@ -12,9 +12,10 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
+
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::record {
 
@@ -33,7 +34,7 @@ std::string moment(std::int64_t utc_ns) {
 
 nlohmann::ordered_json line_of(const drivers::Sample& sample) {
     std::array<double, 3> angle_deg = sample.angle;
-    for (double& angle : angle_deg) angle *= 180 / std::numbers::pi;
+    for (double& angle : angle_deg) angle *= estimator::kDegPerRad;
     nlohmann::ordered_json quality = nlohmann::ordered_json::object();
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         const auto channel = static_cast<drivers::Channel>(c);

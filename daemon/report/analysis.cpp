@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/configuration/configuration.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/dwell_residual.hpp"
 
@@ -134,7 +135,7 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
         const auto after = estimator::dwell_residual(settings, others.value, vibration, blocks);
         std::array<double, 3> middle{};
         for (std::size_t k = 0; k < 3; ++k)
-            middle[k] = blocks[blocks.size() / 2].angle_rad[k] * 180 / std::numbers::pi;
+            middle[k] = blocks[blocks.size() / 2].angle_rad[k] * estimator::kDegPerRad;
         const Prediction expected = predict(settings, others, middle, vibration);
         const double span_s = blocks.back().time_s - blocks.front().time_s + kBlock_s;
         const double in_block =
@@ -321,7 +322,7 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
         estimator::PlannedDwell planned;
         const auto& angle = campaign.samples[dwells[d].first].angle;
         for (std::size_t k = 0; k < 3; ++k)
-            planned.angles_deg[k] = settings.encoder_sign[k] * (angle[k] * 180 / std::numbers::pi -
+            planned.angles_deg[k] = settings.encoder_sign[k] * (angle[k] * estimator::kDegPerRad -
                                                                 settings.encoder_zero_deg[k]);
         planned.kappa = out.replayed.dwells[d].summary.kappa;
         planned.duration_s = drivers::to_seconds(dwells[d].order->to - dwells[d].order->from);

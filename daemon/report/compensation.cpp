@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -35,7 +35,7 @@ Prediction predict(const estimator::Settings& settings, const Coefficients& of,
     const estimator::Kinematics kinematics(settings);
     const estimator::DriftModel model(settings);
     std::array<double, 3> raw{};
-    for (std::size_t i = 0; i < 3; ++i) raw[i] = attitude_deg[i] * std::numbers::pi / 180;
+    for (std::size_t i = 0; i < 3; ++i) raw[i] = attitude_deg[i] * estimator::kRadPerDeg;
     const auto pose = kinematics.pose(kinematics.gimbal_angles(raw));
     const auto h = model.regressors(pose.up, estimator::second_moment(pose, vibration));
     Prediction out;

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <numbers>
 #include <set>
 
 #include "daemon/record/digest.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/optimum.hpp"
 #include "estimator/plan/positions.hpp"
@@ -27,7 +27,7 @@ constexpr double kSameDirection = 0.02;  // a degree or so: where the gimbals st
 planning::Vec3 position_of(const Campaign& campaign, const record::RecordedDwell& dwell) {
     planning::Vec3 position{};
     for (std::size_t k = 0; k < 3; ++k)
-        position[k] = campaign.samples[dwell.first].angle[k] * 180 / std::numbers::pi;
+        position[k] = campaign.samples[dwell.first].angle[k] * estimator::kDegPerRad;
     return position;
 }
 

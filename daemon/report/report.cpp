@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
@@ -23,6 +22,7 @@
 #include "daemon/report/type_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/version.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/instruction_set.hpp"
 
 namespace vibrig::report {
@@ -53,7 +53,7 @@ std::string position_text(const Campaign& campaign, const record::RecordedDwell&
     std::string text;
     for (const double a : angle)
         text += (text.empty() ? "" : ", ") +
-                fmt::format("{:.1f}", std::remainder(a * 180 / std::numbers::pi, 360.0) + 0.0);
+                fmt::format("{:.1f}", std::remainder(a * estimator::kDegPerRad, 360.0) + 0.0);
     return text;
 }
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <stdexcept>
 
 #include "drivers/sample/assembler.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::rt {
 
@@ -16,7 +16,6 @@ using drivers::Time;
 namespace {
 
 constexpr std::uint32_t kModeBits = 3;
-constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
 
 bool is(const proto::Message* message, const canfd_frame& frame) noexcept {
     return message != nullptr &&
@@ -192,7 +191,7 @@ void StageFeed::pair(const Layout& layout, const canfd_frame& frame, Time arrive
     }
     if (layout.message == gyro_.message) {
         shown_.alone += turn_waits_ ? 1 : 0;
-        for (std::size_t i = 0; i < 3; ++i) turn_[i] = kRadPerArcsec * value[i];
+        for (std::size_t i = 0; i < 3; ++i) turn_[i] = estimator::kRadPerArcsec * value[i];
         if (!good) turn_[0] = std::nan("");
         turn_counter_ = counter;
         turn_waits_ = true;

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "daemon/status/values.hpp"
+#include "estimator/filter/angles.hpp"
 
 namespace vibrig::serve {
 namespace {
@@ -222,9 +223,8 @@ void add_estimate(Families& to, const StatusData& s) {
               {{{"outcome", "rejected"}}, static_cast<double>(e.rejected)}});
     std::vector<std::pair<Labels, double>> innovations, walks, sigma_walks, in_force;
     for (std::size_t j = 0; j < kAxisLabels.size(); ++j) {
-        constexpr double kArcsecond = 4.84813681109536e-6;  // rad
         const Labels axis{{"axis", kAxisLabels[j]}};
-        innovations.emplace_back(axis, e.innovation_arcsec[j] * kArcsecond);
+        innovations.emplace_back(axis, e.innovation_arcsec[j] * estimator::kRadPerArcsec);
         const auto& gyro = s.noise.gyros[j];
         const auto& n = gyro.terms[static_cast<std::size_t>(estimator::allan::Term::N)];
         in_force.emplace_back(axis, gyro.in_force);

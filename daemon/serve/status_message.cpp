@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "daemon/status/values.hpp"
 #include "drivers/sample/channels.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
 
@@ -302,10 +302,10 @@ void fill(v1::Zeros& out, const ZeroStatus& zeros) {
     if (zeros.scale_z_sigma > 0) {
         set(out, &v1::Zeros::set_scale_z_ppm, 1e6 * zeros.scale_z);
         set(out, &v1::Zeros::set_scale_z_sigma_ppm, 1e6 * zeros.scale_z_sigma);
-        constexpr double kArcsec = std::numbers::pi / 180 / 3600;
         for (std::size_t i = 0; i < 2; ++i) {
-            out.add_misalignment_arcsec(finite(zeros.misalignment[i] / kArcsec));
-            out.add_misalignment_sigma_arcsec(finite(zeros.misalignment_sigma[i] / kArcsec));
+            out.add_misalignment_arcsec(finite(zeros.misalignment[i] / estimator::kRadPerArcsec));
+            out.add_misalignment_sigma_arcsec(
+                finite(zeros.misalignment_sigma[i] / estimator::kRadPerArcsec));
         }
     }
     out.set_repeated_at_end(zeros.repeated);

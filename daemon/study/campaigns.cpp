@@ -2,13 +2,13 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/dwells/player.hpp"
 #include "daemon/order/campaign_order.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/study/rig_keys.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
@@ -22,7 +22,6 @@ namespace {
 namespace uncertainty = estimator::uncertainty;
 
 constexpr std::size_t kMostCombinations = 10'000;
-constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
 
 std::vector<Setting> settings_at(const Study& study, const std::vector<std::size_t>& place) {
     std::vector<Setting> settings = study.configuration;
@@ -67,7 +66,8 @@ void misalign(Json& truth, const Json& arcsec, const std::string& place) {
     for (std::size_t i = 0; i < 3; ++i) {
         for (std::size_t j = 0; j < 3; ++j) {
             if (i == j) continue;
-            matrix[i][j] = matrix[i][j].get<double>() + kRadPerArcsec * arcsec[at++].get<double>();
+            matrix[i][j] =
+                matrix[i][j].get<double>() + estimator::kRadPerArcsec * arcsec[at++].get<double>();
         }
     }
 }
@@ -123,7 +123,7 @@ class Bench {
         drivers::Sample sample;
         sample.time = drivers::from_seconds(from.time_s);
         for (std::size_t k = 0; k < 3; ++k) {
-            sample.angle[k] = from.readings.encoder_deg[k] * (std::numbers::pi / 180);
+            sample.angle[k] = from.readings.encoder_deg[k] * estimator::kRadPerDeg;
             sample.force[k] = from.readings.raw_g[k];
             for (std::size_t t = 0; t < plant::kTerms; ++t)
                 truth_[plant::kTerms * k + t] += from.coefficients[k][t];

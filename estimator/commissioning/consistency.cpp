@@ -5,6 +5,7 @@
 
 #include "estimator/commissioning/dwell_fit.hpp"
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/settings_check.hpp"
 
@@ -41,7 +42,7 @@ DwellMean DwellMeans::mean(double kappa, bool level_known) const noexcept {
     mean.level_known = level_known;
     mean.begin_s = first_s_;
     mean.duration_s = last_s_ - first_s_;
-    constexpr double kDegPerHourOfRadPerS = 3600 * 180 / kPi;
+    constexpr double kDegPerHourOfRadPerS = 1 / kDegPerHour;
     const double spread = tt_ - t_ * t_ / count_;  // of the times about their mean
     for (std::size_t i = 0; i < 3; ++i) {
         mean.encoder_rad[i] = first_[i] + a_[i] / count_;

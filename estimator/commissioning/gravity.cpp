@@ -7,6 +7,7 @@
 
 #include "estimator/commissioning/gravity_fit.hpp"
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
@@ -77,7 +78,7 @@ std::string out_of_bounds(const Description& d, const GravitySettings& s) {
     const double gain = error.diagonal().cwiseAbs().maxCoeff();
     Eigen::Matrix3d off = error;
     off.diagonal().setZero();
-    const double skew_deg = off.cwiseAbs().maxCoeff() * 180 / kPi;
+    const double skew_deg = off.cwiseAbs().maxCoeff() * kDegPerRad;
     const double zero = d.zero_g.cwiseAbs().maxCoeff();
     if (gain > s.gain) return words("gain %.3f off 1, %g at most", gain, s.gain);
     if (skew_deg > s.misalignment_deg)

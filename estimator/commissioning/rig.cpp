@@ -55,7 +55,7 @@ Description inverted(Description d) {
 const std::vector<AngleUnit>& angle_units() {
     static const std::vector<AngleUnit> units{{"deg", 1},
                                               {"turn", 360},
-                                              {"rad", 180 / kPi},
+                                              {"rad", kDegPerRad},
                                               {"arcmin", 1 / 60.0},
                                               {"gon", 0.9},
                                               {"half degrees", 0.5},

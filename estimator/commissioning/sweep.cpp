@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/commissioning/gravity.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 
@@ -20,7 +21,7 @@ double score_of(const std::vector<Stop>& sweep, std::size_t channel, double degr
     double all = 0;
     for (const Stop& stop : sweep) {
         const double angle =
-            degrees * kPi / 180 * (stop.reading[channel] - sweep.front().reading[channel]);
+            degrees * kRadPerDeg * (stop.reading[channel] - sweep.front().reading[channel]);
         const Eigen::Vector3d row(1, std::cos(angle), std::sin(angle));
         const Eigen::Vector3d force(stop.force[0], stop.force[1], stop.force[2]);
         normal += row * row.transpose();

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 
 #include "estimator/commissioning/words.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
@@ -51,7 +52,7 @@ std::optional<ToldApart> told_apart(const Settings& settings, const Suspect& a, 
                 const std::array<double, 3> position{outer, inner,
                                                      azimuth > 180 ? azimuth - 360 : azimuth};
                 auto reading = encoder_deg(settings, position);
-                for (double& angle : reading) angle *= kPi / 180;
+                for (double& angle : reading) angle *= kRadPerDeg;
                 const Expected one = expected(a, reading), other = expected(b, reading);
                 const double mg = 1e3 * (one.force_g - other.force_g).norm();
                 const double deg_h = (one.slope_deg_h - other.slope_deg_h).norm();

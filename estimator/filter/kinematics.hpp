@@ -10,7 +10,7 @@ namespace vibrig::estimator {
 
 inline constexpr double kEarthRateDegPerHour = 15.041067;
 /// The gimbals are singular at 90 deg of the inner angle; measurements beyond this are refused.
-inline constexpr double kMaxInnerAngleRad = 80.0 * kPi / 180.0;
+inline constexpr double kMaxInnerAngleRad = 80.0 * kRadPerDeg;
 
 /// The angle plus whole turns, in [-pi, pi].
 [[nodiscard]] double wrap(double angle_rad) noexcept;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_filter.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/settings_check.hpp"
@@ -24,7 +25,7 @@ using Matrix3x30 = Eigen::Matrix<double, 3, kParameters>;
 Matrix3x30 sensitivity(const Kinematics& kinematics, const DriftModel& model,
                        const PlannedDwell& dwell, const ParameterArray& nominal) {
     Eigen::Vector3d angles(dwell.angles_deg[0], dwell.angles_deg[1], dwell.angles_deg[2]);
-    angles *= kPi / 180.0;
+    angles *= kRadPerDeg;
     const Pose start = kinematics.pose(angles);
     const Regressors at_start = model.regressors(start.up, dwell.kappa);
     const Eigen::Vector3d rate = start.m * model.platform_rate(start, at_start, nominal.data());

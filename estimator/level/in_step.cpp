@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/level/sync_motion.hpp"
 
@@ -11,7 +12,6 @@ namespace vibrig::estimator {
 namespace {
 
 constexpr double kLeast_g = 0.005;  // below, nothing vibrates
-constexpr double kArcsec = kPi / 180 / 3600;
 // Beyond this many sigmas once in 1e9, in six and in four dimensions.
 constexpr double kChanceOfSix = 7.304, kChanceOfFour = 6.919;
 constexpr double kSystematic = 3;  // standard uncertainties of what instruments do always
@@ -62,7 +62,7 @@ InStep in_step(std::span<const LoopReading> readings, double hz, const Settings&
         for (std::size_t k = 0; k < 3; ++k) {
             const double angle = std::remainder(r.angle_rad[k] - lines[k].first, 2 * kPi);
             const double off = angle - lines[k].constant - lines[k].slope * (r.time_s - middle_s);
-            arcsec[k] = settings.encoder_sign[k] * off / kArcsec;
+            arcsec[k] = settings.encoder_sign[k] * off / kRadPerArcsec;
             left += arcsec[k] * arcsec[k];
         }
         motion.add(r.time_s - begin_s, arcsec);

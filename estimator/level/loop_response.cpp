@@ -7,6 +7,8 @@
 #include <complex>
 #include <numbers>
 
+#include "estimator/filter/angles.hpp"
+
 namespace vibrig::estimator {
 namespace {
 
@@ -119,7 +121,7 @@ LoopResponse loop_response_at(std::span<const LoopReading> readings, double hz) 
     if (out.table_known) {
         const std::complex<double> table = fit.phasor(kTable);
         out.table_g = std::abs(table);
-        out.phase_deg = std::arg(along * std::conj(table)) * 180 / std::numbers::pi;
+        out.phase_deg = std::arg(along * std::conj(table)) * kDegPerRad;
     }
     return out;
 }

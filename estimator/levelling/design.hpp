@@ -9,10 +9,7 @@
 /// "A Fast Damping Algorithm for INS with External Velocity Reference".
 namespace vibrig::estimator::levelling {
 
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kArcmin = kPi / 180 / 60;        ///< rad
-inline constexpr double kDegPerHour = kPi / 180 / 3600;  ///< rad/s
-inline constexpr double kMostStep = 0.05;                ///< sigma T of the sampled loop
+inline constexpr double kMostStep = 0.05;  ///< sigma T of the sampled loop
 
 /// Names the quantity, the value found and what was expected.
 class DesignError : public std::invalid_argument {

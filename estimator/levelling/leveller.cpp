@@ -4,15 +4,16 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/refusal.hpp"
 
 namespace vibrig::estimator::levelling {
 namespace {
 
-constexpr double kLeastTolerance = 0.05 * kArcmin;
+constexpr double kLeastTolerance = 0.05 * kRadPerArcmin;
 constexpr double kLargestTolerance =
-    5 * kArcmin;  // that the noise may ask for; beyond is not level
-constexpr double kLargestTilt = 5 * kPi / 180;
+    5 * kRadPerArcmin;  // that the noise may ask for; beyond is not level
+constexpr double kLargestTilt = 5 * kRadPerDeg;
 constexpr int kMissingAllowed = 3;
 constexpr double kSureness = 4;  // standard deviations
 
@@ -326,7 +327,7 @@ std::string Leveller::message() const {
                 return text(
                     "tilt of the %s channel is about %.3g deg: small-angle model not valid "
                     "above 5 deg, coarse levelling first",
-                    channel, trouble_value_ * 180 / kPi);
+                    channel, trouble_value_ * kDegPerRad);
             case Trouble::torquer_limit:
                 return text(
                     "torquer limit %.6g deg/h reached on the %s channel at %.3f s: %.6g "
@@ -337,8 +338,9 @@ std::string Leveller::message() const {
                 return text(
                            "cannot settle: tolerance %.3g' is below %g times the noise of the mean "
                            "specific force over %.4g s, %.3g' (of that the tilt %.3g', mostly %s)",
-                           trouble_value_ / kArcmin, kSureness, settings_.window_s,
-                           force_noise_ / kArcmin, budget_.total / kArcmin, budget_.dominant()) +
+                           trouble_value_ / kRadPerArcmin, kSureness, settings_.window_s,
+                           force_noise_ / kRadPerArcmin, budget_.total / kRadPerArcmin,
+                           budget_.dominant()) +
                        remedy();
             case Trouble::drift_above_limit:
                 return text(
@@ -357,8 +359,9 @@ std::string Leveller::message() const {
                 : text("%s of the %s channel was the last to leave its band, %.3g' against %.3g' "
                        "at %.4g s; noise %.3g' of the force, %.3g' of the rate, mostly %s",
                        outside_.what, outside_.channel == 0 ? "first" : "second",
-                       outside_.value / kArcmin, outside_.band / kArcmin, outside_.time_s,
-                       force_noise_ / kArcmin, rate_noise_ / kArcmin, budget_.dominant())) +
+                       outside_.value / kRadPerArcmin, outside_.band / kRadPerArcmin,
+                       outside_.time_s, force_noise_ / kRadPerArcmin, rate_noise_ / kRadPerArcmin,
+                       budget_.dominant())) +
            (failure.empty() ? "" : "; " + failure);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -13,7 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kArcsec = kPi / 180.0 / 3600.0;
 constexpr std::array<const char*, 3> kGimbal{"outer", "inner", "azimuth"};
 constexpr std::array<const char*, 3> kAxis{"x", "y", "z"};
 constexpr std::array<const char*, 6> kCross{"xy", "xz", "yx", "yz", "zx", "zy"};
@@ -21,7 +21,7 @@ constexpr std::array<const char*, 2> kSkew{"outer-inner", "inner-azimuth"};
 constexpr std::array<const char*, 2> kLevel{"north", "east"};
 
 /// The steps of differences, in SI units: where the model is linear to many digits.
-constexpr double kAngleStep = 60 * kArcsec, kShareStep = 1e-3;
+constexpr double kAngleStep = 60 * kRadPerArcsec, kShareStep = 1e-3;
 
 using Set = std::function<void(Disturbance&, double)>;
 
@@ -33,16 +33,16 @@ void each_input(const Inputs& in, const Each& each) {
                          double step, const Set& set) {
         each(key, std::move(element), d, unit, step, set, false);
     };
-    one("latitude", "", in.latitude_arcsec, kArcsec, kAngleStep,
+    one("latitude", "", in.latitude_arcsec, kRadPerArcsec, kAngleStep,
         [](Disturbance& d, double x) { d.latitude_rad = x; });
-    one("azimuth", "", in.azimuth_arcsec, kArcsec, kAngleStep,
+    one("azimuth", "", in.azimuth_arcsec, kRadPerArcsec, kAngleStep,
         [](Disturbance& d, double x) { d.azimuth_rad = x; });
     for (std::size_t k = 0; k < 3; ++k)
-        one("encoder_zero", kGimbal[k], in.encoder_zero_arcsec[k], kArcsec, kAngleStep,
+        one("encoder_zero", kGimbal[k], in.encoder_zero_arcsec[k], kRadPerArcsec, kAngleStep,
             [k](Disturbance& d, double x) { d.encoder_zero_rad[k] = x; });
     for (std::size_t k = 0; k < 2; ++k)
-        one("non_orthogonality", kSkew[k], in.non_orthogonality_arcsec[k], kArcsec, kAngleStep,
-            [k](Disturbance& d, double x) { d.non_orthogonality_rad[k] = x; });
+        one("non_orthogonality", kSkew[k], in.non_orthogonality_arcsec[k], kRadPerArcsec,
+            kAngleStep, [k](Disturbance& d, double x) { d.non_orthogonality_rad[k] = x; });
     for (const Harmonic& harmonic : in.resolver_harmonics) {
         const Declared phase{harmonic.arcsec / std::sqrt(2.0), Shape::arcsine,
                              std::numeric_limits<double>::infinity(),
@@ -53,7 +53,7 @@ void each_input(const Inputs& in, const Each& each) {
                     "resolver_harmonics",
                     std::to_string(harmonic.order) + " per turn, " + kGimbal[k] +
                         (part == 0 ? ", cosine" : ", sine"),
-                    phase, kArcsec, kArcsec,
+                    phase, kRadPerArcsec, kRadPerArcsec,
                     [order = harmonic.order, k, part](Disturbance& d, double x) {
                         d.resolver_rad(order, k, part) = x;
                     },

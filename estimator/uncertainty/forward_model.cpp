@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/second_moment.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -67,8 +68,8 @@ ForwardModel::ForwardModel(const Settings& settings, const ParameterArray& coeff
     : kinematics_(settings),
       model_(settings),
       coefficients_(coefficients),
-      latitude_rad_(settings.latitude_deg * kPi / 180.0),
-      azimuth_rad_(settings.azimuth_deg * kPi / 180.0) {}
+      latitude_rad_(settings.latitude_deg * kRadPerDeg),
+      azimuth_rad_(settings.azimuth_deg * kRadPerDeg) {}
 
 Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const {
     const Vector3d theta = row.angles;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/second_moment.hpp"
@@ -37,7 +38,7 @@ Result planned_result(const Settings& settings, const std::vector<PlannedStop>& 
         row.nis_per_dof = 1;
         row.used = static_cast<std::uint32_t>(stop.duration_s / period_s);
         for (std::size_t k = 0; k < 3; ++k)
-            row.angles[static_cast<Eigen::Index>(k)] = stop.angles_deg[k] * kPi / 180.0;
+            row.angles[static_cast<Eigen::Index>(k)] = stop.angles_deg[k] * kRadPerDeg;
         const Pose pose = kinematics.pose(row.angles);
         const Regressors h = model.regressors(pose.up, second_moment(pose, row.vibration));
         for (std::size_t j = 0; j < kGyros; ++j) {

@@ -4,13 +4,13 @@
 #include <array>
 #include <utility>
 
+#include "estimator/filter/angles.hpp"
+
 namespace vibrig::estimator::uncertainty {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr double kArcmin = kPi / 180.0 / 60.0;
 
 constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
 constexpr std::array<const char*, 3> kGimbalName{"outer", "inner", "azimuth"};
@@ -68,7 +68,8 @@ Signatures resolver(const DwellTable& table, const ForwardModel& model, int orde
     Builder of(table, model, size, "arcsec");
     for (std::size_t k = 0; k < 3; ++k) {
         for (std::size_t part = 0; part < 2; ++part) {
-            of.add(std::string(kGimbalName[k]) + (part == 0 ? " cosine" : " sine"), kArcmin / 60.0,
+            of.add(std::string(kGimbalName[k]) + (part == 0 ? " cosine" : " sine"),
+                   kRadPerArcmin / 60.0,
                    [=](Disturbance& d, double x) { d.resolver_rad(order, k, part) = x; });
         }
     }
@@ -139,12 +140,12 @@ Signatures signatures(Misfit misfit, const DwellTable& table, const ForwardModel
         }
         case Misfit::azimuth: {
             Builder of(table, model, 3, "arcmin");
-            of.add("", kArcmin, [](Disturbance& d, double x) { d.azimuth_rad = x; });
+            of.add("", kRadPerArcmin, [](Disturbance& d, double x) { d.azimuth_rad = x; });
             return of.take();
         }
         case Misfit::latitude: {
             Builder of(table, model, 3, "arcmin");
-            of.add("", kArcmin, [](Disturbance& d, double x) { d.latitude_rad = x; });
+            of.add("", kRadPerArcmin, [](Disturbance& d, double x) { d.latitude_rad = x; });
             return of.take();
         }
         case Misfit::time_base: {
@@ -155,15 +156,15 @@ Signatures signatures(Misfit misfit, const DwellTable& table, const ForwardModel
         case Misfit::encoder_zero: {
             Builder of(table, model, 1, "arcmin");
             for (std::size_t k = 0; k < 3; ++k)
-                of.add(kGimbalName[k], kArcmin,
+                of.add(kGimbalName[k], kRadPerArcmin,
                        [k](Disturbance& d, double x) { d.encoder_zero_rad[k] = x; });
             return of.take();
         }
         case Misfit::non_orthogonality: {
             Builder of(table, model, 1, "arcmin");
-            of.add("outer-inner", kArcmin,
+            of.add("outer-inner", kRadPerArcmin,
                    [](Disturbance& d, double x) { d.non_orthogonality_rad[0] = x; });
-            of.add("inner-azimuth", kArcmin,
+            of.add("inner-azimuth", kRadPerArcmin,
                    [](Disturbance& d, double x) { d.non_orthogonality_rad[1] = x; });
             return of.take();
         }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/units.hpp"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/azimuth_gain.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/units.hpp"

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/error_model.hpp"
 #include "estimator/zeros/units.hpp"
@@ -18,7 +19,7 @@ constexpr double kTimeScale_s = 30;
 StateVector scales(const Site& site) {
     StateVector s;
     const double metre = 1 / site.radius_m;
-    const double rate = 0.1 * kPi / 180 / 3600;
+    const double rate = 0.1 * kDegPerHour;
     const double force = 1e-3 * site.gravity_mps2;
     s << 1e-3, 1e-3, 1e-3, 1, 1, 1, metre, metre / std::cos(site.latitude_rad), 1, rate, rate, rate,
         force, force, force;
@@ -79,7 +80,7 @@ Observability observability(const std::vector<double>& azimuths_deg, const Site&
     Eigen::MatrixXd som(90 * static_cast<Eigen::Index>(azimuths_deg.size()), kStates);
     Eigen::Index row = 0;
     for (const double azimuth : azimuths_deg) {
-        const double psi = azimuth * kPi / 180;
+        const double psi = azimuth * kRadPerDeg;
         Eigen::Matrix3d c;
         c << std::cos(psi), -std::sin(psi), 0, std::sin(psi), std::cos(psi), 0, 0, 0, 1;
         const StateMatrix a = kTimeScale_s * (scale.cwiseInverse().asDiagonal() *
@@ -140,7 +141,7 @@ int rank_with_shares(const std::vector<double>& azimuths_deg, const std::vector<
     Eigen::Index row = 0;
     for (const Way& way : ways) {
         for (const double azimuth : azimuths_deg) {
-            const double psi = azimuth * kPi / 180;
+            const double psi = azimuth * kRadPerDeg;
             const double up = way.down ? -1 : 1;
             Eigen::Matrix3d level;  // columns: two level axes, the upright one
             level << std::cos(psi), -up * std::sin(psi), 0, std::sin(psi), up * std::cos(psi), 0, 0,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/strapdown.hpp"
 #include "estimator/zeros/units.hpp"
 

@@ -10,9 +10,6 @@
 
 namespace vibrig::estimator::zeros {
 
-inline constexpr double kDegPerHour = kRadPerDeg / 3600;    ///< rad/s
-inline constexpr double kDegPerRootHour = kRadPerDeg / 60;  ///< rad/sqrt(s)
-
 [[nodiscard]] inline Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
 
 [[nodiscard]] inline Eigen::Matrix3d matrix(const std::array<Triple, 3>& rows) {

@@ -1,4 +1,5 @@
 #include "estimator/zeros/zero_filter.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/units.hpp"
 

@@ -26,10 +26,10 @@ levelling::LevellerSettings settings_of(const Options& options) {
     loop.ramp_s = options.ramp_s;
     loop.period_s = options.period_s;
     loop.window_s = options.window_s;
-    loop.tolerance_rad = options.tolerance * kArcmin;
+    loop.tolerance_rad = options.tolerance * kRadPerArcmin;
     loop.torquer_limit = options.torquer_limit * kDegPerHour;
     loop.noise = {options.reference_noise, options.accelerometer_noise_g * options.gravity,
-                  options.gyro_noise * kArcmin};  // deg/sqrt(h) is arcmin/sqrt(s)
+                  options.gyro_noise * kRadPerArcmin};  // deg/sqrt(h) is arcmin/sqrt(s)
     return loop;
 }
 
@@ -42,12 +42,12 @@ void check_samples(const char* option, double duration_s, double period_s) {
 
 Json budget_json(const levelling::Leveller& loop) {
     const levelling::NoiseBudget& budget = loop.budget();
-    return {{"reference_arcmin", budget.reference / kArcmin},
-            {"accelerometer_arcmin", budget.accelerometer / kArcmin},
-            {"gyro_arcmin", budget.gyro / kArcmin},
-            {"total_arcmin", budget.total / kArcmin},
+    return {{"reference_arcmin", budget.reference / kRadPerArcmin},
+            {"accelerometer_arcmin", budget.accelerometer / kRadPerArcmin},
+            {"gyro_arcmin", budget.gyro / kRadPerArcmin},
+            {"total_arcmin", budget.total / kRadPerArcmin},
             {"dominant", budget.dominant()},
-            {"mean_force_arcmin", loop.force_noise() / kArcmin}};
+            {"mean_force_arcmin", loop.force_noise() / kRadPerArcmin}};
 }
 
 Json gains_json(const levelling::Gains& gains) {
@@ -59,8 +59,9 @@ std::string budget_table(const levelling::Leveller& loop) {
     return printed(
         "noise of the tilt, 1 sigma: reference %.4g', accelerometer %.4g', gyro %.4g'; "
         "together %.4g' (mostly %s); of the mean specific force %.4g'\n",
-        budget.reference / kArcmin, budget.accelerometer / kArcmin, budget.gyro / kArcmin,
-        budget.total / kArcmin, budget.dominant(), loop.force_noise() / kArcmin);
+        budget.reference / kRadPerArcmin, budget.accelerometer / kRadPerArcmin,
+        budget.gyro / kRadPerArcmin, budget.total / kRadPerArcmin, budget.dominant(),
+        loop.force_noise() / kRadPerArcmin);
 }
 
 namespace {

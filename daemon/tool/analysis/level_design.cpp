@@ -18,13 +18,13 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
     levelling::Scenario start;
     start.loop = loop;
     start.loop.noise = {};
-    start.tilt = {kArcmin, 0};
+    start.tilt = {kRadPerArcmin, 0};
     start.duration_s = 2 * loop.settling_s;
     plot::Curve curve{"sampled loop"};
     const auto run = levelling::simulate(start);
     const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 1000);
     for (std::size_t k = 0; k < run.trace.size(); k += every) {
-        curve.add(run.trace[k].time_s, run.trace[k].tilt[0] / kArcmin);
+        curve.add(run.trace[k].time_s, run.trace[k].tilt[0] / kRadPerArcmin);
     }
     chart.curves.push_back(curve);
     if (options.gains.empty()) {
@@ -43,7 +43,7 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
 std::optional<double> declared_within(const Options& options,
                                       const levelling::LevellerSettings& loop) {
     check_samples("--settling", levelling::kPatience * loop.settling_s, loop.period_s);
-    const Pair tilt = pair(options.tilt, kArcmin);
+    const Pair tilt = pair(options.tilt, kRadPerArcmin);
     const Pair drift = pair(options.drift, kDegPerHour);
     const Pair zero = pair(options.zero_mg, 1e-3);
     double most_tilt = 0;
@@ -54,7 +54,7 @@ std::optional<double> declared_within(const Options& options,
             std::max(most_drift, std::abs(drift[i]) +
                                      std::abs(options.reference_error[i]) / loop.earth.radius_m);
     }
-    return levelling::declared_within_s(loop, most_tilt + std::abs(options.step) * kArcmin,
+    return levelling::declared_within_s(loop, most_tilt + std::abs(options.step) * kRadPerArcmin,
                                         most_drift);
 }
 
@@ -81,7 +81,7 @@ int run_design(const Options& options) {
                            {{"K1_times_1_plus_K2", gains.k1 * (1 + gains.k2)}, {"K3", gains.k3}}},
                           {"longest_period_s", levelling::kMostStep / sigma},
                           {"declared_within_s", declared ? Json(*declared) : Json(nullptr)},
-                          {"tolerance_arcmin", leveller.tolerance() / kArcmin},
+                          {"tolerance_arcmin", leveller.tolerance() / kRadPerArcmin},
                           {"noise", budget_json(leveller)},
                           {"message", leveller.message()}}
                          .dump()
@@ -101,7 +101,7 @@ int run_design(const Options& options) {
             << printed(
                    "tolerance %.3g'; from tilts up to %.4g' and %.4g' with drifts up to %.4g and "
                    "%.4g deg/h ",
-                   leveller.tolerance() / kArcmin, options.tilt[0], options.tilt[1],
+                   leveller.tolerance() / kRadPerArcmin, options.tilt[0], options.tilt[1],
                    options.drift[0], options.drift[1])
             << (declared ? printed("declared settled within %.4g s (one start in twenty at most is "
                                    "more than 5 %% late)\n",

@@ -7,14 +7,15 @@
 #include <vector>
 
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace vibrig::tool::level_command {
 
 namespace levelling = estimator::levelling;
 using Json = nlohmann::ordered_json;
-using levelling::kArcmin;
-using levelling::kDegPerHour;
+using estimator::kDegPerHour;
+using estimator::kRadPerArcmin;
 using levelling::Pair;
 
 /// As typed; angles in arcmin, rates in deg/h.

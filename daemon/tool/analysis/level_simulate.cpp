@@ -21,11 +21,11 @@ levelling::Scenario scenario_of(const Options& options) {
     start.network = options.network == "fast"           ? levelling::Network::fast
                     : options.network == "conventional" ? levelling::Network::conventional
                                                         : levelling::Network::undamped;
-    start.tilt = pair(options.tilt, kArcmin);
+    start.tilt = pair(options.tilt, kRadPerArcmin);
     start.drift = pair(options.drift, kDegPerHour);
     start.zero = pair(options.zero_mg, 1e-3 * options.gravity);
     start.reference_error = pair(options.reference_error, 1);
-    start.step = {options.step * kArcmin, options.step * kArcmin};
+    start.step = {options.step * kRadPerArcmin, options.step * kRadPerArcmin};
     start.step_s = options.step_s;
     start.duration_s =
         options.duration_s > 0 ? options.duration_s : 3.1 * options.specification.settling_s;
@@ -48,7 +48,7 @@ void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
         plot::Curve of_tilt{name};
         plot::Curve of_rate{name};
         for (std::size_t k = 0; k < run.trace.size(); k += every) {
-            of_tilt.add(run.trace[k].time_s, run.trace[k].tilt[i] / kArcmin);
+            of_tilt.add(run.trace[k].time_s, run.trace[k].tilt[i] / kRadPerArcmin);
             of_rate.y.push_back(run.trace[k].rate[i] / kDegPerHour);
         }
         of_rate.x = of_tilt.x;
@@ -130,8 +130,8 @@ int run_many(const Options& options) {
                           {"median_s", proto::number_or_null(many.time_within(0.5))},
                           {"p95_s", proto::number_or_null(many.time_within(0.95))},
                           {"longest_s", proto::number_or_null(many.time_within(1))},
-                          {"worst_tilt_arcmin", many.worst_tilt / kArcmin},
-                          {"tolerance_arcmin", tolerance / kArcmin}}
+                          {"worst_tilt_arcmin", many.worst_tilt / kRadPerArcmin},
+                          {"tolerance_arcmin", tolerance / kRadPerArcmin}}
                          .dump()
                   << '\n';
     } else {
@@ -143,7 +143,7 @@ int run_many(const Options& options) {
                          "time: median %.5g s, 95 %% within %.5g s, longest %.5g s; largest tilt "
                          "when declared %.3g' (tolerance %.3g')\n",
                          many.time_within(0.5), many.time_within(0.95), many.time_within(1),
-                         many.worst_tilt / kArcmin, tolerance / kArcmin);
+                         many.worst_tilt / kRadPerArcmin, tolerance / kRadPerArcmin);
     }
     return many.never == 0 && 20 * many.late <= options.runs && many.falsely == 0 ? 0 : kNo;
 }
@@ -170,25 +170,25 @@ int run_simulate(const Options& options) {
         Json result = {{"network", options.network},
                        {"gains", gains_json(start.loop.fast)},
                        {"seed", options.seed},
-                       {"tilt_arcmin", both(end, kArcmin)},
-                       {"tilt_deviation_arcmin", run.tilt_deviation() / kArcmin}};
+                       {"tilt_arcmin", both(end, kRadPerArcmin)},
+                       {"tilt_deviation_arcmin", run.tilt_deviation() / kRadPerArcmin}};
         if (fast) {
             result["verdict"] = levelling::name_of(run.verdict);
             result["settled_s"] = run.settled_s >= 0 ? Json(run.settled_s) : Json(nullptr);
-            result["force_arcmin"] = both(run.observables.force_rad, kArcmin);
+            result["force_arcmin"] = both(run.observables.force_rad, kRadPerArcmin);
             result["drift_deg_h"] = both(run.drift, kDegPerHour);
-            result["tolerance_arcmin"] = leveller.tolerance() / kArcmin;
+            result["tolerance_arcmin"] = leveller.tolerance() / kRadPerArcmin;
             result["noise"] = budget_json(leveller);
             result["message"] = run.message;
         }
         std::cout << result.dump() << '\n';
     } else {
         std::cout << printed("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
-                             end[0] / kArcmin, end[1] / kArcmin);
+                             end[0] / kRadPerArcmin, end[1] / kRadPerArcmin);
         if (fast) {
             std::cout << (run.settled_s >= 0 ? printed("settled after %.5g s", run.settled_s)
                                              : std::string(levelling::name_of(run.verdict)))
-                      << printed("; tolerance %.3g'\n", leveller.tolerance() / kArcmin)
+                      << printed("; tolerance %.3g'\n", leveller.tolerance() / kRadPerArcmin)
                       << printed("drift found: %.5g and %.5g deg/h\n", run.drift[0] / kDegPerHour,
                                  run.drift[1] / kDegPerHour)
                       << budget_table(leveller);

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -14,6 +13,7 @@
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"
@@ -130,7 +130,7 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
         held.relative_errors.push_back(row.relative_error);
         std::array<double, 3> deg{};
         for (std::size_t i = 0; i < 3; ++i)
-            deg[i] = row.angles[static_cast<Index>(i)] * 180 / std::numbers::pi;
+            deg[i] = row.angles[static_cast<Index>(i)] * estimator::kDegPerRad;
         held.deg.push_back(deg);
     }
     return held;
@@ -287,7 +287,7 @@ Predicted predict_for(const PredictOptions& options) {
     for (const std::string& text : options.attitudes) {
         const auto deg = read_attitude(text);
         out.deg.push_back(deg);
-        situations.push_back({Eigen::Vector3d(deg[0], deg[1], deg[2]) * (std::numbers::pi / 180),
+        situations.push_back({Eigen::Vector3d(deg[0], deg[1], deg[2]) * estimator::kRadPerDeg,
                               vibration.moment, vibration.bands, options.seconds, false,
                               vibration.moments});
     }

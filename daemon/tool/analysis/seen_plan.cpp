@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <iostream>
-#include <numbers>
 #include <optional>
 #include <utility>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/level/hann.hpp"
 #include "estimator/level/vibration_level.hpp"
@@ -27,7 +27,7 @@ class SeenPlan::Dwell {
         std::array<double, 3> angle_deg{};
         double all = 0;
         for (std::size_t i = 0; i < 3; ++i) {
-            angle_deg[i] = measurement.angle_rad[i] * (180 / std::numbers::pi);
+            angle_deg[i] = measurement.angle_rad[i] * estimator::kDegPerRad;
             all += angle_deg[i] + measurement.force_g[i];
         }
         const bool good = measurement.angles_good && measurement.force_good;

@@ -1,9 +1,9 @@
 #include "daemon/tool/analysis/swept_dwells.hpp"
 
-#include <numbers>
 #include <stdexcept>
 
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
 
 namespace vibrig::tool {
@@ -42,7 +42,7 @@ estimator::Measurement measurement_of(const proto::RecordingRow& row) noexcept {
     estimator::Measurement measurement;
     measurement.time_s = row.time_s;
     for (std::size_t i = 0; i < 3; ++i) {
-        measurement.angle_rad[i] = row.angle_deg[i] * (std::numbers::pi / 180);
+        measurement.angle_rad[i] = row.angle_deg[i] * estimator::kRadPerDeg;
         measurement.force_g[i] = row.force_g[i];
     }
     return measurement;

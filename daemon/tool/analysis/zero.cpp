@@ -50,7 +50,7 @@ zeros::CalibrationSettings settings_of(const Options& options) {
     zeros::CalibrationSettings s = options.calibration;
     s.site.latitude_rad = options.latitude_deg * estimator::kRadPerDeg;
     s.noise.scale_factor = options.scale_ppm * 1e-6;
-    s.noise.misalignment = options.misalignment_arcsec * kArcsec;
+    s.noise.misalignment = options.misalignment_arcsec * kRadPerArcsec;
     s.plan.targets_deg = options.slews;
     s.upright = options.upright == "y" ? 1 : 2;
     for (std::size_t i = 0; i < 3; ++i) s.lever_arm_m[i] = options.lever_arm[i];
@@ -117,7 +117,7 @@ zeros::Calibration calibration_of(const Options& options, const std::string& fil
         zeros::Increment in;
         in.time_s = columns[0].times[k];
         for (std::size_t i = 0; i < 3; ++i) {
-            in.turn_rad[i] = columns[i].values[k] * kArcsec;
+            in.turn_rad[i] = columns[i].values[k] * kRadPerArcsec;
             in.velocity_mps[i] = columns[i + 3].values[k];
         }
         in.azimuth_rad =
@@ -153,7 +153,7 @@ void write_increments(const Options& options, const zeros::CalibrationSettings& 
     for (double k = 0; k <= steps; ++k) {
         const zeros::Increment in = unit.next();
         out << in.time_s;
-        for (const double turn : in.turn_rad) out << ',' << turn / kArcsec;
+        for (const double turn : in.turn_rad) out << ',' << turn / kRadPerArcsec;
         for (const double dv : in.velocity_mps) out << ',' << dv;
         out << ',' << in.azimuth_rad / estimator::kRadPerDeg << '\n';
     }
@@ -176,7 +176,7 @@ int run_simulate(const Options& options) {
         errors.scale[i] = options.real_scale_ppm[i] * 1e-6;
     }
     for (std::size_t i = 0; i < 2; ++i)
-        errors.accelerometer_cross[i][2] = options.real_misalignment_arcsec[i] * kArcsec;
+        errors.accelerometer_cross[i][2] = options.real_misalignment_arcsec[i] * kRadPerArcsec;
     errors.vibration_g = options.vibration_g;
     if (!options.write.empty()) {
         (void)zeros::Calibration(s);  // refuses what cannot work

@@ -24,7 +24,8 @@ Share share_of(std::size_t i, std::size_t k) {
     // Towards z, the axis that every calibration has, it has no more of a name.
     const std::string to = k == 2 ? "" : std::string("_to_") + kAxisLetters[k];
     return {"misalignment" + to + "_arcsec",
-            k == 2 ? "misalignment" : std::string("towards ") + kAxisLetters[k], kArcsec, "arcsec"};
+            k == 2 ? "misalignment" : std::string("towards ") + kAxisLetters[k], kRadPerArcsec,
+            "arcsec"};
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ namespace vibrig::tool::zero_command {
 namespace zeros = estimator::zeros;
 using Json = nlohmann::ordered_json;
 
+using estimator::kRadPerArcsec;
 using estimator::kRadPerDeg;
-inline constexpr double kArcsec = kRadPerDeg / 3600;
 inline constexpr std::array kAxisLetters{"x", "y", "z"};
 
 [[nodiscard]] plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace);

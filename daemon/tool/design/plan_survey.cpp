@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <stdexcept>
 
 #include "daemon/results/spectrum_json.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/design/plan_study.hpp"
 #include "daemon/tool/design/plan_sweeps.hpp"
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/spectrum/sampling.hpp"
@@ -83,7 +83,7 @@ class SurveyPlan {
             ups_.push_back(planning::up_at(c_.estimator, position));
             const Vec3 deg = planning::attitude_of(c_.estimator, position);
             task_.gimbal_rad.push_back(Eigen::Vector3d(deg[0], deg[1], deg[2]) *
-                                       (std::numbers::pi / 180));
+                                       estimator::kRadPerDeg);
         }
         task_.settings = c_.estimator;
         task_.rate_variance =
@@ -103,7 +103,7 @@ class SurveyPlan {
         if (!request_.survey.attitudes.empty()) attitudes.clear();
         for (const std::string& one : request_.survey.attitudes) {
             const auto deg = read_attitude(one);
-            attitudes.push_back(Eigen::Vector3d(deg[0], deg[1], deg[2]) * (std::numbers::pi / 180));
+            attitudes.push_back(Eigen::Vector3d(deg[0], deg[1], deg[2]) * estimator::kRadPerDeg);
         }
         for (const auto& attitude : attitudes)
             situations_.push_back({attitude, there.moment, there.bands, 0, false, there.moments});

@@ -5,6 +5,7 @@
 
 #include <initializer_list>
 #include <span>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>

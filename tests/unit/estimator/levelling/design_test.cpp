@@ -5,12 +5,16 @@
 #include <limits>
 #include <string>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/noise_budget.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace {
 
 using namespace vibrig::estimator::levelling;
+using vibrig::estimator::kDegPerHour;
+using vibrig::estimator::kPi;
+using vibrig::estimator::kRadPerArcmin;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -139,9 +143,10 @@ TEST(LevellingDesign, SteadyTiltFollowsDriftAndZero) {
             tilt += kPeriod * (kDrift - rate);
         }
         // THEN eqs. 8 and 9
-        EXPECT_NEAR(tilt / kArcmin, steady_tilt(used, kDrift, kZero) / kArcmin, 1e-6) << k3;
+        EXPECT_NEAR(tilt / kRadPerArcmin, steady_tilt(used, kDrift, kZero) / kRadPerArcmin, 1e-6)
+            << k3;
         if (k3 > 0) {
-            EXPECT_NEAR(tilt / kArcmin, -0.34378, 1e-5);
+            EXPECT_NEAR(tilt / kRadPerArcmin, -0.34378, 1e-5);
             EXPECT_NEAR(network.drift() / kDegPerHour, 5, 1e-6);
         }
     }
@@ -157,10 +162,10 @@ TEST(LevellingDesign, TheNoiseBudgetIsWhatTheLoopShows) {
     };
     const std::array<Source, 3> sources{{{{0.2, 0, 0}, 0.1074},
                                          {{0, 1e-5 * 9.80665, 0}, 0.00340},
-                                         {{0, 0, 0.005 * kArcmin}, 0.0429}}};
+                                         {{0, 0, 0.005 * kRadPerArcmin}, 0.0429}}};
     for (const auto& [noise, published] : sources) {
         const NoiseBudget budget = noise_budget(gains, noise, 1);
-        EXPECT_NEAR(budget.total / kArcmin, published, 2e-3 * published);
+        EXPECT_NEAR(budget.total / kRadPerArcmin, published, 2e-3 * published);
         // WHEN it runs for 400 000 correlation times of both channels together
         Scenario run;
         run.loop.fast = gains;
@@ -183,7 +188,7 @@ TEST(LevellingDesign, TheNoiseBudgetIsWhatTheLoopShows) {
     Scenario start;
     start.loop.fast = gains_of(0.0525, 0.7);
     start.loop.period_s = 0.1;
-    start.loop.noise = {0, 5e-5 * 9.80665, 0.002 * kArcmin};
+    start.loop.noise = {0, 5e-5 * 9.80665, 0.002 * kRadPerArcmin};
     start.duration_s = 300;
     double squares = 0;
     constexpr int kStarts = 200;

@@ -7,12 +7,16 @@
 #include <random>
 #include <string>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/simulation.hpp"
 #include "tests/unit/support/allocation_count.hpp"
 
 namespace {
 
 using namespace vibrig::estimator::levelling;
+using vibrig::estimator::kDegPerHour;
+using vibrig::estimator::kPi;
+using vibrig::estimator::kRadPerArcmin;
 
 constexpr double kG = 9.80665;
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
@@ -23,7 +27,7 @@ LevellerSettings rig() {
     s.settling_s = 100;
     s.period_s = 0.1;
     s.window_s = 10;
-    s.tolerance_rad = 0.2 * kArcmin;
+    s.tolerance_rad = 0.2 * kRadPerArcmin;
     s.noise.accelerometer_mps2 = 1e-5 * kG;
     return s;
 }
@@ -79,7 +83,7 @@ TEST(LevellingManyStarts, All1000AreDeclaredInTimeAndNoneFalsely) {
         for (std::size_t i = 0; i < 2; ++i) {
             start.tilt[i] = 0.5 * kPi / 180 * uniform(generator);
             start.drift[i] = std::copysign(0.1 * kDegPerHour, uniform(generator));
-            start.step[i] = std::copysign(2 * kArcmin, uniform(generator));
+            start.step[i] = std::copysign(2 * kRadPerArcmin, uniform(generator));
         }
         start.step_s = settings.settling_s * (1 + uniform(generator));
         // WHEN each runs
@@ -108,7 +112,7 @@ TEST(LevellingManyStarts, AreDeclaredWithinTheTimeThatIsSaidOfThem) {
                                   {600, 1, 1, 0, 30, quiet},
                                   {100, 0.1, 1, 0, 30, {0, 3e-5 * kG, 0}},
                                   {100, 0.9, 0.9, 0, 30, quiet},
-                                  {600, 1, 1, 0, 10, {0, 1e-5 * kG, 0.005 * kArcmin}},
+                                  {600, 1, 1, 0, 10, {0, 1e-5 * kG, 0.005 * kRadPerArcmin}},
                                   {600, 1, 1, 0, 10, {0.2, 1e-5 * kG, 0}},
                                   {100, 0.1, 1, 0.0448, 30, quiet}};
     for (const Case& c : cases) {
@@ -117,12 +121,12 @@ TEST(LevellingManyStarts, AreDeclaredWithinTheTimeThatIsSaidOfThem) {
         start.loop.settling_s = c.settling_s;
         start.loop.period_s = c.period_s;
         start.loop.window_s = c.window_s;
-        start.loop.tolerance_rad = c.tolerance * kArcmin;
+        start.loop.tolerance_rad = c.tolerance * kRadPerArcmin;
         start.loop.noise = c.noise;
         start.until_settled = true;
         start.duration_s = kPatience * c.settling_s;
         const double drift = 0.1 * kDegPerHour;
-        const auto within = declared_within_s(start.loop, c.tilt * kArcmin, drift);
+        const auto within = declared_within_s(start.loop, c.tilt * kRadPerArcmin, drift);
         ASSERT_TRUE(within.has_value()) << c.settling_s << ' ' << c.tilt;
         // WHEN 100 start with tilts of at least half of that
         constexpr std::uint64_t kStarts = 100;
@@ -131,7 +135,7 @@ TEST(LevellingManyStarts, AreDeclaredWithinTheTimeThatIsSaidOfThem) {
             std::mt19937_64 generator(start.seed ^ 0x77U);
             std::uniform_real_distribution<double> half(0.5, 1);
             for (std::size_t i = 0; i < 2; ++i) {
-                start.tilt[i] = half(generator) * c.tilt * kArcmin;
+                start.tilt[i] = half(generator) * c.tilt * kRadPerArcmin;
                 start.drift[i] = std::copysign(drift, half(generator) - 0.75);
             }
             const SimulatedStart result = simulate(start);
@@ -146,13 +150,13 @@ TEST(LevellingManyStarts, AreDeclaredWithinTheTimeThatIsSaidOfThem) {
     // AND nothing is promised that the loop does not wait for
     LevellerSettings weak = rig();
     weak.torquer_limit = 10 * kDegPerHour;  // 50' in three settling times
-    EXPECT_FALSE(declared_within_s(weak, 60 * kArcmin, 0).has_value());
+    EXPECT_FALSE(declared_within_s(weak, 60 * kRadPerArcmin, 0).has_value());
 }
 
 TEST(Leveller, FindsTheDriftAndLeavesOnlyTheZero) {
     // GIVEN a tilted platform with drift and accelerometer zeros
     Leveller loop(rig());
-    Platform platform{{20 * kArcmin, -15 * kArcmin},
+    Platform platform{{20 * kRadPerArcmin, -15 * kRadPerArcmin},
                       {3 * kDegPerHour, -8 * kDegPerHour},
                       {1e-4 * kG, -2e-4 * kG}};
     // WHEN it has run for 400 s
@@ -161,8 +165,8 @@ TEST(Leveller, FindsTheDriftAndLeavesOnlyTheZero) {
     EXPECT_EQ(out.verdict, Verdict::settled);
     EXPECT_NEAR(loop.drift()[0] / kDegPerHour, 3, 1e-3);
     EXPECT_NEAR(loop.drift()[1] / kDegPerHour, -8, 1e-3);
-    EXPECT_NEAR(platform.tilt[0] / kArcmin, -0.34378, 1e-3);
-    EXPECT_NEAR(platform.tilt[1] / kArcmin, 2 * 0.34378, 1e-3);
+    EXPECT_NEAR(platform.tilt[0] / kRadPerArcmin, -0.34378, 1e-3);
+    EXPECT_NEAR(platform.tilt[1] / kRadPerArcmin, 2 * 0.34378, 1e-3);
     EXPECT_EQ(loop.message(), "");
 }
 
@@ -170,7 +174,7 @@ TEST(Leveller, AWrongSignOrGainDoesNotSettle) {
     // GIVEN a loop whose command moves the platform the wrong way, or a tenth as far as it should
     for (const double sign : {-1.0, 0.1}) {
         Leveller loop(rig());
-        Platform platform{{10 * kArcmin, 10 * kArcmin}, {}, {}};
+        Platform platform{{10 * kRadPerArcmin, 10 * kRadPerArcmin}, {}, {}};
         LevelOutput out;
         for (int k = 0; k < 3500; ++k) {
             out = loop.step(platform.input());
@@ -194,7 +198,7 @@ TEST(Leveller, HoldsFastGainsUntilSettledAndThenRampsWithoutAStep) {
     s.period_s = 1;
     Scenario start;
     start.loop = s;
-    start.tilt = {10 * kArcmin, 0};
+    start.tilt = {10 * kRadPerArcmin, 0};
     start.duration_s = 14400;
     const SimulatedStart result = simulate(start);
     // THEN the tilt is within 2 % after 540 s, as with fast gains alone, and stays there
@@ -202,7 +206,7 @@ TEST(Leveller, HoldsFastGainsUntilSettledAndThenRampsWithoutAStep) {
     ASSERT_GT(result.settled_s, 0);
     // AND while the gains ramp (60 s) and at their end the command makes no step: it changes less
     // from sample to sample than the settled loop may still demand, tol * sigma
-    const double most = 0.05 * kArcmin * 0.0088;
+    const double most = 0.05 * kRadPerArcmin * 0.0088;
     for (std::size_t k = static_cast<std::size_t>(result.settled_s) - 1; k + 1 < 2000; ++k) {
         EXPECT_LT(std::abs(result.trace[k + 1].rate[0] - result.trace[k].rate[0]), most) << k;
     }
@@ -253,7 +257,8 @@ TEST(Leveller, MissingSamplesAndNansHoldTheLoop) {
     for (const auto& [spoil, samples, words] : cases) {
         // GIVEN a loop under way
         Leveller loop(rig());
-        Platform platform{{5 * kArcmin, 5 * kArcmin}, {8 * kDegPerHour, 8 * kDegPerHour}, {}};
+        Platform platform{
+            {5 * kRadPerArcmin, 5 * kRadPerArcmin}, {8 * kDegPerHour, 8 * kDegPerHour}, {}};
         run(loop, platform, 50, 0.1);
         const double z = loop.axis(0).z();
         const double last = loop.step(platform.input()).rate[0];
@@ -276,7 +281,7 @@ TEST(Leveller, MissingSamplesAndNansHoldTheLoop) {
 
 TEST(Leveller, WithoutItsReferenceItBecomesUndampedWithoutAStep) {
     Leveller loop(rig());
-    Platform platform{{5 * kArcmin, 0}, {}, {}};
+    Platform platform{{5 * kRadPerArcmin, 0}, {}, {}};
     run(loop, platform, 20, 0.1);
     const double before = loop.step(platform.input()).rate[0];
     LevelInput stale = platform.input();
@@ -342,7 +347,7 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
     Leveller loop(rig());
     Platform platform{};
     const LevelOutput out = run(loop, platform, 310, 0.1, [](LevelInput& in, int k) {
-        in.force[0] += (k / 100) % 2 == 0 ? 2 * kArcmin * kG : -2 * kArcmin * kG;
+        in.force[0] += (k / 100) % 2 == 0 ? 2 * kRadPerArcmin * kG : -2 * kRadPerArcmin * kG;
     });
     EXPECT_EQ(out.verdict, Verdict::not_settled);
     expect_words(loop.message(),
@@ -352,7 +357,7 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
     // AND a tolerance below the noise is refused from the start
     LevellerSettings s = rig();
     s.noise.accelerometer_mps2 = 1e-2 * kG;
-    s.tolerance_rad = 0.05 * kArcmin;
+    s.tolerance_rad = 0.05 * kRadPerArcmin;
     Leveller hopeless(s);
     EXPECT_EQ(hopeless.step({}).verdict, Verdict::cannot_settle);
     expect_words(hopeless.message(),
@@ -365,13 +370,13 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
     // AND up to 5' only: beyond that nothing is level
     s.noise.accelerometer_mps2 = 1e-2 * kG;
     Leveller noisy(s);
-    EXPECT_NEAR(noisy.tolerance(), 5 * kArcmin, 1e-12);
+    EXPECT_NEAR(noisy.tolerance(), 5 * kRadPerArcmin, 1e-12);
     EXPECT_EQ(noisy.step({}).verdict, Verdict::cannot_settle);
     // AND what the mean over one sample cannot do, that over the window named can
     LevellerSettings brief = rig();
     brief.window_s = 0.1;
     EXPECT_EQ(Leveller(brief).verdict(), Verdict::settling);  // 4 x 0.0345' against 0.2'
-    brief.tolerance_rad = 0.05 * kArcmin;
+    brief.tolerance_rad = 0.05 * kRadPerArcmin;
     const Leveller refused(brief);
     EXPECT_EQ(refused.verdict(), Verdict::cannot_settle);
     ASSERT_TRUE(refused.window_needed_s().has_value());
@@ -381,7 +386,7 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
     brief.window_s = 0.8;
     EXPECT_EQ(Leveller(brief).verdict(), Verdict::settling);
     s.noise = {};
-    EXPECT_NEAR(Leveller(s).tolerance() / kArcmin, 0.05, 1e-12);
+    EXPECT_NEAR(Leveller(s).tolerance() / kRadPerArcmin, 0.05, 1e-12);
 }
 
 TEST(Leveller, ANoisyReferenceStillSettles) {
@@ -392,7 +397,7 @@ TEST(Leveller, ANoisyReferenceStillSettles) {
     start.loop.period_s = 1;
     start.loop.noise.reference_mps = 0.2;
     start.reference_error = {0.5, -0.5};
-    start.tilt = {3 * kArcmin, -3 * kArcmin};
+    start.tilt = {3 * kRadPerArcmin, -3 * kRadPerArcmin};
     start.duration_s = 1800;
     start.seed = 3;
     const SimulatedStart result = simulate(start);
@@ -402,7 +407,7 @@ TEST(Leveller, ANoisyReferenceStillSettles) {
 
 TEST(Leveller, AllocatesNothingWhileItRuns) {
     Leveller loop(rig());
-    Platform platform{{5 * kArcmin, 1 * kArcmin}, {}, {}};
+    Platform platform{{5 * kRadPerArcmin, 1 * kRadPerArcmin}, {}, {}};
     const std::uint64_t before = vibrig::test::allocations();
     for (int k = 0; k < 3000; ++k) {
         LevelInput input = platform.input();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "estimator/filter/angles.hpp"
 #include "tests/plant/rig.hpp"
 
 namespace vibrig::estimator::levelling {
@@ -31,9 +32,9 @@ TEST(SimulatedStart, LevelsAsTheSimulatedRigDoes) {
     scenario.loop.fast = design({100, 0.005, 0.7}).gains;
     scenario.loop.period_s = 4 * kTick_s;
     scenario.loop.window_s = 10;
-    scenario.loop.tolerance_rad = 0.2 * kArcmin;
+    scenario.loop.tolerance_rad = 0.2 * kRadPerArcmin;
     scenario.loop.noise.accelerometer_mps2 = 1e-4 * scenario.loop.earth.gravity_mps2 / 2;
-    scenario.loop.noise.gyro_random_walk = truth.gyro_random_walk_deg_per_rt_h * kPi / 180 / 60;
+    scenario.loop.noise.gyro_random_walk = truth.gyro_random_walk_deg_per_rt_h * kDegPerRootHour;
     scenario.duration_s = 200;
     scenario.seed = 31;
     // The free platform: what its drift and the Earth's rate make of the tilt, u' = u x w.

@@ -2,11 +2,14 @@
 
 #include <cmath>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace {
 
 using namespace vibrig::estimator::levelling;
+using vibrig::estimator::kDegPerHour;
+using vibrig::estimator::kRadPerArcmin;
 
 constexpr Gains kGains{0.0264, 202.5, 0.9045};  // sigma 0.0088, xi 0.7
 
@@ -34,7 +37,7 @@ TEST(Vehicle, InternalDampingFollowsTheApparentVertical) {
     // and with the velocity from outside nothing of it, at a constant error of it neither
     s.internal = false;
     s.reference_error = {0.5, 0};
-    EXPECT_NEAR(last_tilt(s), 0, 0.01 * kArcmin);
+    EXPECT_NEAR(last_tilt(s), 0, 0.01 * kRadPerArcmin);
 }
 
 TEST(Vehicle, WithoutTheIntegratorDriftLeavesATilt) {
