@@ -3,6 +3,8 @@
 // table visits its columns:
 //   column(name, field, unit, description): numbers; a field of several is one row of the column,
 //   column.newer(...): likewise, where older recordings have none and the field stays as it is,
+//   column.by_channel(...): a number for each channel, found by the names that the file gives them;
+//     a channel that an older recording lacks is unbound,
 //   column.text(name, field, bytes, description).
 #pragma once
 
@@ -20,6 +22,7 @@
 #include "daemon/domain/events.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/records.hpp"
+#include "drivers/sample/channels.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::record {
@@ -53,6 +56,17 @@ struct DwellNumbers {
     double sync_arcsec = not_known<1>()[0];
 };
 
+/// Of the channels. Until recordings named them there were these.
+inline const hdf5::Names& channel_names() {
+    static const hdf5::Names kNames = [] {
+        hdf5::Names names{
+            {}, {"outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"}};
+        for (const auto& row : drivers::kChannelTable) names.now.emplace_back(row.name);
+        return names;
+    }();
+    return kNames;
+}
+
 inline constexpr const char* kTimeText =
     "daemon's clock; UTC is this plus the file's utc_offset_ns";
 
@@ -63,9 +77,9 @@ void columns_of(Of<drivers::Sample> auto& s, auto&& column) {
     column("angle_rad", s.angle, "rad", "encoders: outer, inner, azimuth; raw");
     column("force_g", s.force, "g", "specific force, accelerometer axes x, y, z; raw");
     column("table_accel_g", s.table_accel, "g", "accelerometer on the table");
-    column("quality", std::span(s.quality).template first<drivers::kChannels>(), "",
-           "of outer, inner, azimuth, accelerometers x, y, z, table: 0 good, 1 missing, 2 stale, "
-           "3 flagged, 4 out of range, 5 unbound");
+    column.by_channel("quality", std::span(s.quality).template first<drivers::kChannels>(), "",
+                      "of each channel, see names: 0 good, 1 missing, 2 stale, 3 flagged, 4 out of "
+                      "range, 5 unbound");
 }
 
 /// The interlock's as many as the row has: no columns of none.
@@ -282,7 +296,14 @@ struct Specify {
         specs.push_back({name, type_of<typename decltype(numbers)::value_type>(), 0,
                          std::move(shape), unit, description});
     }
-    void newer(const auto&... column) { (*this)(column...); }
+    void newer(const auto&... column) {
+        (*this)(column...);
+        specs.back().newer = true;
+    }
+    void by_channel(const auto&... column) {
+        (*this)(column...);
+        specs.back().names = &channel_names();
+    }
     void text(const char* name, const auto&, std::size_t bytes, const char* description) {
         specs.push_back({name, hdf5::Type::text, bytes, {}, "", description});
     }
@@ -312,6 +333,7 @@ struct Put {
         }
     }
     void newer(const auto&... column) { (*this)(column...); }
+    void by_channel(const auto&... column) { (*this)(column...); }
     void text(const char*, const std::string& text, const auto&...) { table.put(text); }
     void text(const char*, Severity severity, const auto&...) { table.put(name_of(severity)); }
 };

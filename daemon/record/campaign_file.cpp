@@ -54,6 +54,19 @@ struct Columns {
             cells.emplace_back();
         }
     }
+    void by_channel(const char* name, const auto&...) {
+        const std::string path = group + "/" + name;
+        const auto places = file.places(path, channel_names());
+        const auto found = file.integers(path);
+        const std::size_t length = found.dimensions.at(0);
+        std::vector<std::int64_t> all(length * drivers::kChannels,
+                                      static_cast<std::int64_t>(drivers::Quality::unbound));
+        for (std::size_t i = 0; i < found.values.size(); ++i)
+            all[i / places.size() * drivers::kChannels + places[i % places.size()]] =
+                found.values[i];
+        rows = std::min(rows, length);
+        cells.emplace_back(std::move(all));
+    }
     void text(const char* name, const auto&...) {
         rows =
             std::min(rows, std::get<3>(cells.emplace_back(file.texts(group + "/" + name))).size());
@@ -114,6 +127,7 @@ struct Take {
     void newer(const char* name, auto& field, const char* unit, const char* description) {
         (*this)(name, field, unit, description);
     }
+    void by_channel(const auto&... column) { (*this)(column...); }
     void text(const char*, auto& field, const auto&...) {
         set(field, std::get<std::vector<std::string>>(columns[next++])[row]);
     }

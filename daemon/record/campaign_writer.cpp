@@ -52,6 +52,7 @@ std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
                                       {"part", head.part},
                                       {"restart", head.restart},
                                       {"dwells_before", head.dwells_before},
+                                      {"channels", channel_names().now},
                                       {"units", units}};
     return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }

@@ -9,7 +9,9 @@
 #include <cstdio>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 namespace vibrig::record::hdf5 {
@@ -103,6 +105,14 @@ std::vector<std::size_t> dimensions_of(const Handle& set) {
     std::vector<hsize_t> found(static_cast<std::size_t>(std::max(rank, 0)));
     H5Sget_simple_extent_dims(space.get(), found.data(), nullptr);
     return {found.begin(), found.end()};
+}
+
+constexpr const char* kNames = "names";
+
+std::string joined(const std::vector<std::string>& names) {
+    std::string all;
+    for (const std::string& name : names) all += (all.empty() ? "" : " ") + name;
+    return all;
 }
 
 /// Of values in an array of those dimensions.
@@ -323,6 +333,42 @@ std::vector<std::size_t> File::dimensions(const std::string& name) const {
     return dimensions_of(open_set(name));
 }
 
+std::vector<std::size_t> File::places(const std::string& name, const Names& names) const {
+    const Handle set = open_set(name);
+    const auto refuse = [&](const std::string& found, const std::string& expected) {
+        throw Error(path_ + ": " + name + ": found " + found + ", expected " + expected);
+    };
+    const auto dimensions = dimensions_of(set);
+    if (dimensions.size() != 2)
+        refuse(std::to_string(dimensions.size()) + " dimensions", "2: rows and numbers in a row");
+    const std::size_t width = dimensions[1];
+    const std::string numbers = std::to_string(width) + " numbers in a row";
+    const std::string most = std::to_string(names.now.size()) + " (" + joined(names.now) + ")";
+    std::vector<std::string> found = names.unnamed;
+    if (H5Aexists(set.get(), kNames) > 0) {
+        std::istringstream words(text(name, kNames));
+        found.assign(std::istream_iterator<std::string>(words), {});
+        if (found.size() != width)
+            refuse(numbers, std::to_string(found.size()) + " by its names " + joined(found));
+    }
+    if (width == 0) refuse(numbers, "1 to " + most);
+    if (width > found.size())
+        refuse(numbers + " without names", std::to_string(found.size()) + " at most");
+    found.resize(width);
+    std::vector<std::size_t> places;
+    for (const std::string& one : found) {
+        const auto at = std::ranges::find(names.now, one) - names.now.begin();
+        const auto place = static_cast<std::size_t>(at);
+        if (place == names.now.size())
+            refuse(numbers + ", one of them " + one,
+                   "at most " + most + "; a newer vibrigd wrote it");
+        if (std::ranges::find(places, place) != places.end())
+            refuse(one + " twice among its names", "it once");
+        places.push_back(place);
+    }
+    return places;
+}
+
 namespace {
 
 /// What a dying disk did not take must not look like a measurement: no number, no time, and a
@@ -361,6 +407,8 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std
         if (column.dataset.get() < 0) file.fail(column.name);
         if (*column.spec.unit != '\0') file.set(column.name, "unit", column.spec.unit);
         file.set(column.name, "description", column.spec.description);
+        if (column.spec.names != nullptr)
+            file.set(column.name, kNames, joined(column.spec.names->now));
     }
 }
 
@@ -368,8 +416,12 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns)
     : file_(&file), group_(std::move(group)) {
     for (auto& spec : columns) {
         Column& column = add(std::move(spec));
+        if (column.spec.newer && !file.has(column.name)) continue;
         column.dataset = file.open_set(column.name);
         rows_ = dimensions_of(column.dataset).at(0);
+        if (column.spec.names == nullptr) continue;
+        column.places = file.places(column.name, *column.spec.names);
+        column.spec.shape = {column.places.size()};
     }
 }
 
@@ -385,6 +437,7 @@ Table::Column& Table::add(ColumnSpec spec) {
 
 void Table::keep(std::size_t rows) {
     for (Column& column : columns_) {
+        if (column.dataset.get() < 0) continue;
         const auto found = dimensions_of(column.dataset);
         std::vector<hsize_t> size(found.begin(), found.end());
         size.at(0) = std::min<hsize_t>(size.at(0), rows);
@@ -397,7 +450,12 @@ void Table::put(const void* cell, std::size_t size) {
     Column& column = columns_[next_];
     if (size != column.bytes) throw std::logic_error(column.name + ": a cell of another size");
     const auto* bytes = static_cast<const unsigned char*>(cell);
-    column.buffer.insert(column.buffer.end(), bytes, bytes + size);
+    const auto keep = [&](std::size_t from, std::size_t count) {
+        column.buffer.insert(column.buffer.end(), bytes + from, bytes + from + count);
+    };
+    const std::size_t number = H5Tget_size(column.type.get());
+    for (const std::size_t place : column.places) keep(place * number, number);
+    if (column.places.empty() && column.dataset.get() >= 0) keep(0, size);
     next_ = (next_ + 1) % columns_.size();
     if (next_ == 0) ++waiting_;
 }
@@ -411,6 +469,7 @@ void Table::put(std::string_view text) {
 void Table::commit() {
     if (waiting_ == 0) return;
     for (Column& column : columns_) {
+        if (column.dataset.get() < 0) continue;
         std::vector<hsize_t> start{rows_}, count{waiting_}, size{rows_ + waiting_};
         for (const std::size_t d : column.spec.shape) {
             start.push_back(0);

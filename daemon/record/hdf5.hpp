@@ -46,6 +46,12 @@ struct Array {
     std::vector<T> values;
 };
 
+/// Of the numbers in a row of a column that has one for each of something: its attribute `names`.
+struct Names {
+    std::vector<std::string> now;
+    std::vector<std::string> unnamed;  ///< the first of these, where the file does not say
+};
+
 /// One file; one thread at a time. Everything throws Error.
 class File {
   public:
@@ -80,6 +86,10 @@ class File {
     [[nodiscard]] Array<std::int64_t> integers(const std::string& name) const;
     [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
     [[nodiscard]] std::vector<std::size_t> dimensions(const std::string& name) const;
+    /// Of each number in a row of such a column its place in `names.now`. An older file may have
+    /// fewer; one with others is refused.
+    [[nodiscard]] std::vector<std::size_t> places(const std::string& name,
+                                                  const Names& names) const;
 
     [[nodiscard]] std::int64_t id() const noexcept { return file_.get(); }
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
@@ -106,9 +116,12 @@ struct ColumnSpec {
     std::vector<std::size_t> shape;  ///< of one row of numbers; empty: one
     const char* unit;                ///< empty: none
     const char* description;
+    bool newer = false;            ///< older files have none
+    const Names* names = nullptr;  ///< of the numbers in a row; null: none
 };
 
-/// A group of columns that grow together, row by row. Rows are kept until commit().
+/// A group of columns that grow together, row by row. Rows are kept until commit(). Of a file that
+/// is older than the columns, the ones that it has, as it has them.
 class Table {
   public:
     Table(File& file, std::string group, std::vector<ColumnSpec> columns, std::size_t chunk_rows,
@@ -131,6 +144,7 @@ class Table {
         ColumnSpec spec;
         std::string name;  ///< in the file
         Handle dataset, type;
+        std::vector<std::size_t> places;  ///< in a cell, of a row's numbers; empty: as they are
     };
     /// With no dataset yet.
     Column& add(ColumnSpec spec);

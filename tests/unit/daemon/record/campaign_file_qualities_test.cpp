@@ -1,0 +1,219 @@
+#include "daemon/record/campaign_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/hdf5.hpp"
+#include "drivers/sample/channels.hpp"
+
+namespace vibrig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using drivers::Quality;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr const char* kQuality = "/samples/quality";
+constexpr std::size_t kSamples = 5;
+
+/// A file whose qualities another build wrote, or which lies about them.
+class CampaignFile : public ::testing::Test {
+  protected:
+    CampaignFile() {
+        std::string name = (fs::temp_directory_path() / "vibrig-campaign-file.XXXXXX").string();
+        folder_ = ::mkdtemp(name.data());
+        path_ = (folder_ / "campaign.h5").string();
+    }
+    ~CampaignFile() override {
+        std::error_code ignored;
+        fs::remove_all(folder_, ignored);
+    }
+
+    /// Samples whose channels all have another quality, channel c that of number c % 5.
+    void write(std::size_t samples = kSamples) const {
+        Head head;
+        head.name = "test";
+        CampaignWriter writer(path_, head);
+        for (std::size_t i = 0; i < samples; ++i) {
+            drivers::Sample sample;
+            sample.time = static_cast<drivers::Time>(i + 1) * drivers::kSecond;
+            for (std::size_t c = 0; c < drivers::kChannels; ++c) sample.quality[c] = quality_of(c);
+            sample.table_accel = 0.5;
+            writer.put(sample);
+        }
+        writer.end({"finished", "", "", "", 1});
+    }
+    static Quality quality_of(std::size_t channel) { return static_cast<Quality>(channel % 5); }
+
+    /// Takes the place of the qualities; without names as recordings had them before they did.
+    void lie(std::vector<std::size_t> shape, const std::vector<double>& row,
+             const std::string& names = "") const {
+        std::size_t numbers = 1;
+        for (const std::size_t d : shape) numbers *= d;
+        std::vector<double> values(numbers);
+        for (std::size_t i = 0; i < numbers && !row.empty(); ++i) values[i] = row[i % row.size()];
+        hdf5::File file = hdf5::File::open(path_, hdf5::File::Mode::write);
+        file.write_numbers(kQuality, values, shape, "", "");
+        if (!names.empty()) file.set(kQuality, "names", names);
+        file.close();
+    }
+    std::string refusal() const {
+        try {
+            static_cast<void>(read_campaign(path_));
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    }
+
+    fs::path folder_;
+    std::string path_;
+};
+
+std::vector<int> qualities(const drivers::Sample& sample) {
+    std::vector<int> all;
+    for (std::size_t c = 0; c < drivers::kChannels; ++c)
+        all.push_back(static_cast<int>(sample.quality[c]));
+    return all;
+}
+
+TEST_F(CampaignFile, NamesTheChannelsOfItsQualities) {
+    write();
+    std::string names;
+    for (const auto& row : drivers::kChannelTable)
+        names += (names.empty() ? "" : " ") + std::string(row.name);
+    const auto file = hdf5::File::open(path_, hdf5::File::Mode::read);
+    EXPECT_EQ(file.text(kQuality, "names"), names);
+    EXPECT_THAT(file.read_text("/head"), HasSubstr(R"("channels":["outer","inner")"));
+    for (const auto& sample : read_campaign(path_).samples)
+        for (std::size_t c = 0; c < drivers::kChannels; ++c)
+            EXPECT_EQ(sample.quality[c], quality_of(c)) << drivers::kChannelTable[c].name;
+}
+
+TEST_F(CampaignFile, OfAnOlderBuildLacksAChannelWhichIsUnboundThen) {
+    write();
+    lie({kSamples, 6}, {0, 1, 2, 3, 4, 0}, "outer inner azimuth accel_x accel_y accel_z");
+    auto samples = read_campaign(path_).samples;
+    ASSERT_EQ(samples.size(), kSamples);
+    EXPECT_THAT(qualities(samples.back()), ElementsAre(0, 1, 2, 3, 4, 0, 5));
+    // AND before the file named them they were the first ones
+    lie({kSamples, 6}, {0, 1, 2, 3, 4, 0});
+    EXPECT_THAT(qualities(read_campaign(path_).samples.back()), ElementsAre(0, 1, 2, 3, 4, 0, 5));
+    lie({kSamples, 7}, {0, 1, 2, 3, 4, 0, 1});
+    EXPECT_THAT(qualities(read_campaign(path_).samples.back()), ElementsAre(0, 1, 2, 3, 4, 0, 1));
+    // AND a single row is one
+    fs::remove(path_);
+    write(1);
+    lie({1, 6}, {0, 1, 2, 3, 4, 0});
+    samples = read_campaign(path_).samples;
+    ASSERT_EQ(samples.size(), 1U);
+    EXPECT_THAT(qualities(samples.back()), ElementsAre(0, 1, 2, 3, 4, 0, 5));
+}
+
+TEST_F(CampaignFile, InAnotherOrderIsReadByItsNames) {
+    write();
+    lie({kSamples, 7}, {1, 0, 2, 3, 4, 0, 3},
+        "inner outer azimuth table_accel accel_x accel_y accel_z");
+    EXPECT_THAT(qualities(read_campaign(path_).samples.back()), ElementsAre(0, 1, 2, 4, 0, 3, 3));
+    lie({kSamples, 2}, {1, 2}, "accel_z inner");
+    EXPECT_THAT(qualities(read_campaign(path_).samples.back()), ElementsAre(5, 2, 5, 5, 5, 1, 5));
+}
+
+TEST_F(CampaignFile, WithoutSamplesIsReadWhateverItsWidth) {
+    write(0);
+    EXPECT_EQ(read_campaign(path_).samples.size(), 0U);
+    lie({0, 6}, {});
+    EXPECT_EQ(read_campaign(path_).samples.size(), 0U);
+    lie({0, 8}, {});
+    EXPECT_THAT(refusal(), HasSubstr("found 8 numbers in a row without names, expected 7 at most"));
+}
+
+TEST_F(CampaignFile, OfANewerBuildIsRefusedWithWhatItHas) {
+    write();
+    const std::string all = "outer inner azimuth accel_x accel_y accel_z table_accel";
+    lie({kSamples, 8}, {0}, all + " humidity");
+    EXPECT_EQ(refusal(), path_ + ": " + kQuality +
+                             ": found 8 numbers in a row, one of them humidity, expected at most "
+                             "7 (" +
+                             all + "); a newer vibrigd wrote it");
+    // AND one that has another in the place of a known one, which is no wider
+    lie({kSamples, 7}, {0}, "outer inner azimuth accel_x accel_y accel_z humidity");
+    EXPECT_THAT(refusal(), AllOf(HasSubstr("one of them humidity"), HasSubstr("a newer vibrigd")));
+    lie({kSamples, 8}, {0});
+    EXPECT_THAT(refusal(), AllOf(HasSubstr(path_ + ": " + kQuality), HasSubstr("found 8 numbers"),
+                                 HasSubstr("expected 7 at most")));
+}
+
+TEST_F(CampaignFile, ThatContradictsItselfIsRefused) {
+    write();
+    const std::string all = "outer inner azimuth accel_x accel_y accel_z table_accel";
+    lie({kSamples, 6}, {0}, all);
+    EXPECT_THAT(refusal(), HasSubstr("found 6 numbers in a row, expected 7 by its names outer"));
+    lie({kSamples, 8}, {0}, all);
+    EXPECT_THAT(refusal(), HasSubstr("found 8 numbers in a row, expected 7 by its names outer"));
+    lie({kSamples, 2}, {0}, "outer outer");
+    EXPECT_THAT(refusal(), HasSubstr("found outer twice among its names, expected it once"));
+    lie({kSamples, 1}, {0}, " ");
+    EXPECT_THAT(refusal(), HasSubstr("found 1 numbers in a row, expected 0 by its names"));
+    lie({kSamples, 0}, {});
+    EXPECT_THAT(refusal(), HasSubstr("found 0 numbers in a row, expected 1 to 7"));
+    lie({kSamples}, {0});
+    EXPECT_THAT(refusal(), HasSubstr("found 1 dimensions, expected 2: rows and numbers in a row"));
+    lie({kSamples, 7, 1}, {0});
+    EXPECT_THAT(refusal(), HasSubstr("found 3 dimensions, expected 2"));
+    // AND fewer rows than samples are as many samples, as in any column
+    lie({kSamples - 2, 7}, {0});
+    EXPECT_EQ(read_campaign(path_).samples.size(), kSamples - 2);
+}
+
+/// A build with one column more and one number more in a row goes on with an older one's table.
+TEST_F(CampaignFile, OfAnOlderBuildIsGoneOnWithInItsOwnColumns) {
+    const hdf5::Names older{{"b", "a"}, {}}, newer{{"a", "b", "c"}, {"a", "b"}};
+    const auto columns = [](const hdf5::Names& names) {
+        hdf5::ColumnSpec time{"time_ns", hdf5::Type::i64, 0, {}, "ns", ""};
+        hdf5::ColumnSpec quality{"quality", hdf5::Type::u8, 0,     {names.now.size()}, "",
+                                 "",        false,          &names};
+        return std::vector<hdf5::ColumnSpec>{time, quality};
+    };
+    const auto put = [](hdf5::Table& table, std::int64_t time,
+                        const std::vector<std::uint8_t>& quality) {
+        table.put(&time, sizeof time);
+        table.put(quality.data(), quality.size());
+    };
+    auto file = hdf5::File::create(path_);
+    {
+        hdf5::Table table(file, "/t", columns(older), 4, "");
+        put(table, 10, {1, 2});
+        table.commit();
+    }
+    {
+        auto more = columns(newer);
+        more.insert(more.begin() + 1, {"humidity", hdf5::Type::f64, 0, {}, "", "", true});
+        hdf5::Table table(file, "/t", more);
+        table.keep(1);
+        const std::int64_t time = 20;
+        const double humidity = 0.5;
+        const std::vector<std::uint8_t> quality{3, 4, 5};
+        table.put(&time, sizeof time);
+        table.put(&humidity, sizeof humidity);
+        table.put(quality.data(), quality.size());
+        table.commit();
+    }
+    EXPECT_FALSE(file.has("/t/humidity"));
+    EXPECT_THAT(file.integers("/t/time_ns").values, ElementsAre(10, 20));
+    EXPECT_THAT(file.integers("/t/quality").values, ElementsAre(1, 2, 4, 3));
+    // AND what is no older one's is refused
+    const hdf5::Names fewer{{"a"}, {"a"}};
+    EXPECT_THROW(hdf5::Table(file, "/t", columns(fewer)), hdf5::Error);
+}
+
+}  // namespace
+}  // namespace vibrig::record
