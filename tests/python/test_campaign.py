@@ -110,6 +110,57 @@ def test_older_recordings_have_no_conditions(recording):
     assert vibrig.open(recording.folder).conditions.rows == 0
 
 
+def with_quality(path, row, names=None):
+    """All 400 samples of a part say so of their channels; without names as recordings did before they had any."""
+    with h5py.File(path, "r+") as file:
+        if "quality" in file["samples"]:
+            del file["samples/quality"]
+        values = np.tile(np.array(row, np.uint8), (400, *[1] * np.ndim(row)))
+        file["samples"].create_dataset("quality", data=values)
+        if names is not None:
+            file["samples/quality"].attrs["names"] = np.bytes_(names)
+    return path
+
+
+NAMES = "outer inner azimuth accel_x accel_y accel_z table_accel"
+
+
+def test_a_channel_that_an_older_recording_lacks_is_unbound(recording):
+    path = recording.part(1, 0, [1], 1)
+    for row, names, expected in (([0, 1, 2, 3, 4, 0], "outer inner azimuth accel_x accel_y accel_z", [0, 1, 2, 3, 4, 0, 5]),
+                                 ([0, 1, 2, 3, 4, 0], None, [0, 1, 2, 3, 4, 0, 5]),
+                                 ([0, 1, 2, 3, 4, 0, 1], None, [0, 1, 2, 3, 4, 0, 1]),
+                                 ([0, 1, 2, 3, 4, 0, 1], NAMES, [0, 1, 2, 3, 4, 0, 1]),
+                                 ([1, 0], "accel_z inner", [5, 0, 5, 5, 5, 1, 5])):
+        quality = vibrig.open(with_quality(path, row, names)).samples["quality"]
+        assert quality.shape == (400, 7) and list(quality[399]) == expected and quality.dtype == np.uint8
+
+
+def test_parts_with_more_and_fewer_channels_are_joined(recording):
+    with_quality(recording.part(1, 10 * SECOND, [1, 2], 2, state="continued"), [1, 0], "accel_z inner")
+    with_quality(recording.part(2, 10 * SECOND + 400 * STEP, [3], 1), [0, 1, 2, 3, 4, 0, 1], NAMES)
+    joined = vibrig.open(recording.folder)
+    assert list(joined.samples["quality"][0]) == [5, 0, 5, 5, 5, 1, 5]
+    assert list(joined.samples["quality"][-1]) == [0, 1, 2, 3, 4, 0, 1]
+    assert "quality_table" in joined.samples.frame().columns
+
+
+@pytest.mark.parametrize(("row", "names", "words"), [
+    ([0] * 8, NAMES + " humidity", r"campaign.h5: /samples/quality: found 8 numbers in a row, one of them humidity, expected at most 7 "
+     r"\(outer .*\); a newer vibrigd wrote it"),
+    ([0] * 7, NAMES.replace("inner", "humidity"), "one of them humidity"),
+    ([0] * 8, None, "found 8 numbers in a row without names, expected 7 at most"),
+    ([0] * 6, NAMES, "found 6 numbers in a row, expected 7 by its names outer"),
+    ([0, 0], "outer outer", "found outer twice among its names, expected it once"),
+    ([], None, "found 0 numbers in a row, expected 1 to 7"),
+    (0, None, "found 1 dimensions, expected 2"),
+    ([[0]] * 7, None, "found 3 dimensions, expected 2")])
+def test_qualities_of_a_newer_build_or_that_lie_are_refused(recording, row, names, words):
+    path = with_quality(recording.part(1, 0, [1], 1), row, names)
+    with pytest.raises(vibrig.FormatError, match=words):
+        vibrig.open(path)
+
+
 @pytest.mark.parametrize("piece", [1, 7, 2**20])   # rows looked at in one go
 def test_rows_that_never_reached_the_disk_are_left_out(recording, monkeypatch, piece):
     monkeypatch.setattr("vibrig._campaign.PIECE", piece)

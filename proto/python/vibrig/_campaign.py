@@ -31,6 +31,9 @@ LABELS: dict[str, Sequence[str]] = {
     "quality": ("outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table"),
     "value": NAMES, "sigma": NAMES, "observable": NAMES}
 
+CHANNELS = ("outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel")
+UNBOUND = 5  # quality of a channel that there is not
+
 PathLike = Union[str, "os.PathLike[str]"]
 
 
@@ -70,7 +73,10 @@ class Table(Mapping[str, npt.NDArray[Any]]):
             parts = []
             for segment in self._segments:
                 with _open_file(segment.path) as file:
-                    values = file[self.name][column][:segment.rows][segment.keep]
+                    dataset = file[self.name][column]
+                    values = dataset[:segment.rows][segment.keep]
+                    if (self.name, column) == ("samples", "quality"):
+                        values = _by_channel(values, _places_of(dataset, segment.path))
                 if values.dtype.kind == "S":
                     values = np.array([v.decode("utf-8", "replace") for v in values], dtype=object)
                 parts.append(values + segment.shift_ns if column in TIMES else values)
@@ -243,6 +249,37 @@ class Campaign:
         return found
 
 
+def _places_of(quality: h5py.Dataset, path: Path) -> list[int]:
+    """Of each number in a row its place in CHANNELS, by the names that the file gives; without them the first so many."""
+    def refuse(found: str, expected: str) -> None:
+        raise FormatError(f"{path}: {quality.name}: found {found}, expected {expected}")
+
+    if quality.ndim != 2:
+        refuse(f"{quality.ndim} dimensions", "2: rows and numbers in a row")
+    width, most = quality.shape[1], f"{len(CHANNELS)} ({' '.join(CHANNELS)})"
+    found = list(CHANNELS)
+    if "names" in quality.attrs:
+        found = _text(quality.attrs["names"]).split()
+        if len(found) != width:
+            refuse(f"{width} numbers in a row", f"{len(found)} by its names {' '.join(found)}")
+    if width == 0:
+        refuse("0 numbers in a row", f"1 to {most}")
+    if width > len(found):
+        refuse(f"{width} numbers in a row without names", f"{len(found)} at most")
+    for name in found:
+        if name not in CHANNELS:
+            refuse(f"{width} numbers in a row, one of them {name}", f"at most {most}; a newer vibrigd wrote it")
+        if found.count(name) > 1:
+            refuse(f"{name} twice among its names", "it once")
+    return [CHANNELS.index(name) for name in found[:width]]
+
+
+def _by_channel(values: npt.NDArray[Any], places: Sequence[int]) -> npt.NDArray[Any]:
+    quality = np.full((len(values), len(CHANNELS)), UNBOUND, dtype=values.dtype)
+    quality[:, places] = values
+    return quality
+
+
 def _open_file(path: Path) -> h5py.File:
     """Of one that is being written, too."""
     try:
@@ -338,6 +375,8 @@ def _read_part(path: Path) -> _Part:
             segments[table] = _Segment(path, rows, np.ones(rows, dtype=bool))
             columns[table] = {name: (_text(column.attrs.get("unit", "")), _text(column.attrs.get("description", "")))
                               for name, column in (group.items() if group is not None else ())}
+        if "samples" in file and "quality" in file["samples"]:
+            _places_of(file["samples"]["quality"], path)
         few = {table: {name: file[table][name][:segments[table].rows] for name in names} for table, names in
                (("samples", ("time_ns",)), ("orders", ("announced_ns", "cancel", "run", "position")),
                 ("dwells", ("time_ns", "samples", "run", "position")))}
