@@ -164,6 +164,9 @@ try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end"""
     checks.check("expected a campaign's HDF5 file or its folder" in lines[2], "and says what it did not find", run.stderr)
 
 
+CHANNELS = "outer inner azimuth accel_x accel_y accel_z table_accel".split()
+
+
 def check_parts_in_octave(checks, folder):
     """Of parts made for the purpose: as Python joins them, so does Octave."""
     sys.path.insert(0, os.path.join(ROOT, "tests", "python"))
@@ -175,18 +178,25 @@ def check_parts_in_octave(checks, folder):
                             (2, dict(start=second, orders=[2, 3], done=1, restart=True, before=1, offset_s=1_700_009_000)),
                             (3, dict(start=second + 400 * conftest.STEP, orders=[3, 4], done=2, offset_s=1_700_009_000))):
         path = made.part(part, **arguments)
+        channels = CHANNELS[:6] if part == 1 else CHANNELS[::-1] if part == 2 else CHANNELS   # an older build's, another's
         with h5py.File(path, "r+") as file:
+            quality = np.tile([CHANNELS.index(name) % 5 for name in channels], (400, 1)).astype(np.uint8)
+            file["samples"].create_dataset("quality", data=quality).attrs["names"] = np.bytes_(" ".join(channels))
             file["head"] = np.bytes_(json.dumps({
+                "channels": channels,
                 "name": "test", "campaign": "test-1", "part": part, "restart": bool(arguments.get("restart")), "units": {},
                 "dwells_before": arguments.get("before", 0), "utc_offset_ns": str(file.attrs["utc_offset_ns"])}))
     joined = vibrig.open(made.folder)
     script = f"""addpath('{MATLAB}'); c = vibrig.open('{made.folder}');
 printf('%d %d %s %s', rows(c.samples.force_g), all(diff(double(c.samples.time_ns)) > 0), mat2str(double(c.dwells.position')), ...
-       num2str(c.samples.time_ns(end), '%d'));"""
+       num2str(c.samples.time_ns(end), '%d'));
+printf(' %d', c.samples.quality(1, :), c.samples.quality(end, :));"""
     run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval", script], capture_output=True, text=True, timeout=60)
     positions = "[" + " ".join(str(p) for p in joined.dwells["position"]) + "]"
-    checks.equal(run.stdout, f"{joined.samples.rows} 1 {positions} {joined.samples['time_ns'][-1]}",
-                 "Octave joins parts as Python does")
+    quality = " ".join(str(q) for q in (*joined.samples["quality"][0], *joined.samples["quality"][-1]))
+    checks.equal(run.stdout, f"{joined.samples.rows} 1 {positions} {joined.samples['time_ns'][-1]} {quality}",
+                 "Octave joins parts as Python does, of more and fewer channels, too")
+    checks.equal(quality, "0 1 2 3 4 0 5 0 1 2 3 4 0 1", "and a channel that a part lacks is unbound in it")
     checks.note(run.stderr[-500:])
 
 

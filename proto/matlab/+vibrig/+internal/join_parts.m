@@ -8,6 +8,7 @@ if part.head.part ~= number || ~strcmp(part.campaign, to.campaign)
   error('vibrig:format', '%s: found part %d of %s, expected part %d of %s', part.path, part.head.part, part.campaign, ...
         number, to.campaign);
 end
+[to, part] = same_channels(to, part);
 last = int64(0);
 if ~isempty(to.samples.time_ns), last = to.samples.time_ns(end); end
 if part.head.restart
@@ -35,6 +36,25 @@ for name = {'samples', 'orders', 'dwells', 'estimates', 'conditions', 'events', 
   to.(name{1}) = behind(to.(name{1}), part.(name{1}));
 end
 for name = {'state', 'mark', 'result'}, to.(name{1}) = part.(name{1}); end
+end
+
+function [to, part] = same_channels(to, part)
+% A part of another build may have fewer channels, or others.
+if isequal(to.channels, part.channels), return, end
+all = [to.channels; setdiff(part.channels, to.channels)];
+to = by_channel(to, all);
+part = by_channel(part, all);
+end
+
+function part = by_channel(part, channels)
+if isfield(part.samples, 'quality')
+  found = part.samples.quality;
+  unbound = 5;
+  part.samples.quality = repmat(cast(unbound, class(found)), size(found, 1), numel(channels));
+  [~, places] = ismember(part.channels, channels);
+  if ~isempty(found), part.samples.quality(:, places) = found; end
+end
+part.channels = channels;
 end
 
 function part = moved(part, by)

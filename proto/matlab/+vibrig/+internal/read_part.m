@@ -27,6 +27,8 @@ for name = {'name', 'campaign'}
   part.(name{1}) = '';
   if isfield(part.head, name{1}), part.(name{1}) = part.head.(name{1}); end
 end
+part.channels = {'outer'; 'inner'; 'azimuth'; 'accel_x'; 'accel_y'; 'accel_z'; 'table_accel'};
+if isfield(part.head, 'channels'), part.channels = part.head.channels(:); end
 part.state = 'running';
 part.mark = '';
 if isfield(raw, 'ended')
