@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/dwells_csv.hpp"
 #include "daemon/record/raw_frames.hpp"
 #include "drivers/sample/assembler.hpp"
+#include "drivers/sample/channels.hpp"
 #include "proto/candump.hpp"
 
 namespace vibrig::record {
@@ -20,14 +23,33 @@ using drivers::Time;
 
 namespace {
 
+/// An effective configuration lists every signal that its build knew: what it lacks was not bound.
+void unbind_newer(const std::set<std::string>& listed, drivers::SignalBindings& bindings) {
+    const auto check = [&](const std::string& name, std::string drivers::SignalBindings::*signal) {
+        if (signal != nullptr && !listed.contains("can.signals." + name))
+            (bindings.*signal).clear();
+    };
+    if (!listed.contains("can.signals.sync_count")) return;
+    for (const auto& row : drivers::kChannelTable) {
+        check(row.name, row.signal);
+        check(std::string(row.name) + "_valid", row.valid);
+    }
+    for (const auto& row : drivers::kStatusTable) check(row.name, row.signal);
+}
+
 drivers::AssemblerSettings assembler_settings(const std::string& configuration) {
     std::istringstream lines(configuration);
     std::string kept;
+    std::set<std::string> keys;
     for (std::string line; std::getline(lines, line);) {
-        if (line.starts_with("can.") && !line.starts_with("can.dbc")) kept += line + "\n";
+        if (!line.starts_with("can.") || line.starts_with("can.dbc")) continue;
+        kept += line + "\n";
+        keys.insert(line.substr(0, line.find_first_of(" =")));
     }
-    return configuration::parse(kept, "configuration of the recording", false)
-        .configuration.assembler;
+    auto settings =
+        configuration::parse(kept, "configuration of the recording", false).configuration.assembler;
+    unbind_newer(keys, settings.bindings);
+    return settings;
 }
 
 /// Frames as the acquisition thread takes them.
