@@ -6,6 +6,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/stages/zeroing.hpp"
 #include "estimator/filter/angles.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
 #include "tests/unit/daemon/interlock/fake_shaker.hpp"
@@ -373,6 +374,16 @@ TEST_F(StagesTest, ACampaignHasNoRateThatNobodyStated) {
     settings.sample_s = 0;
     const Ports ports{rig_port, dwell_port, log_port};
     EXPECT_THROW(Campaign(settings, ports), std::invalid_argument);
+}
+
+TEST_F(StagesTest, ZeroingTakesTheCampaignsRate) {
+    settings.rig.accelerometer_g = 1e-3;
+    for (const double rate_hz : {40.0, 100.0, 1000.0}) {
+        settings.sample_s = 1 / rate_hz;
+        const Zeroing stage(settings, rig_port, log_port, false);
+        EXPECT_DOUBLE_EQ(stage.calibration().plan().noise.velocity_random_walk,
+                         1e-3 / std::sqrt(rate_hz));
+    }
 }
 
 }  // namespace

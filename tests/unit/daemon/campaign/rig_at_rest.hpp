@@ -17,7 +17,8 @@ namespace vibrig::campaign {
 /// goes over the wires is rounded as the frames round it.
 class RigAtRest {
   public:
-    explicit RigAtRest(const plant::Truth& truth) : rig_(truth) {}
+    explicit RigAtRest(const plant::Truth& truth)
+        : rig_(truth), second_(static_cast<int>(std::lround(truth.sample_rate_hz))) {}
 
     void slew(const Vector& encoder_deg, plant::GimbalMode mode) {
         plant::Vec3 target{};
@@ -47,7 +48,7 @@ class RigAtRest {
             rig_.torque(torque);
         }
         rig_.torque({});
-        for (int i = 0; i < 8; ++i) rig_.advance();
+        for (int i = 0; i < second_ / 5; ++i) rig_.advance();
         return stage.failure();
     }
 
@@ -112,10 +113,11 @@ class RigAtRest {
         do {
             rig_.advance();
         } while (!rig_.gimbals().in_position());
-        for (int i = 0; i < 40; ++i) rig_.advance();
+        for (int i = 0; i < second_; ++i) rig_.advance();
     }
 
     plant::Rig rig_;
+    int second_;  ///< in samples
 };
 
 }  // namespace vibrig::campaign

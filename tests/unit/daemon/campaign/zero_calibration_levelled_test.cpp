@@ -11,10 +11,15 @@ namespace {
 
 constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
 
-/// 99.9 % point of chi-square; Wilson and Hilferty.
+/// 99.9 % and 0.1 % points of chi-square; Wilson and Hilferty.
 double chi_square_999(double freedom) {
     const double k = 2 / (9 * freedom);
     return freedom * std::pow(1 - k + 3.0902 * std::sqrt(k), 3);
+}
+
+double chi_square_001(double freedom) {
+    const double k = 2 / (9 * freedom);
+    return freedom * std::pow(1 - k - 3.0902 * std::sqrt(k), 3);
 }
 
 struct Draw {
@@ -79,6 +84,84 @@ TEST(LevelledZeros, AreWithinTheirSigmaWhereverTheSlewsEndAndHoweverTheAxesLie) 
 TEST(LevelledZeros, AboutASecondAxisTheyAreWithinTheirSigmaWhereZCannotBeDown) {
     expect_honest_zeros(20, {0.2, 50, false, true});
 }
+
+/// Zeros where next to nothing but the noise of the accelerometers' samples matters, at their rate.
+class ZerosAtARate : public testing::TestWithParam<double> {
+  protected:
+    static constexpr double kNoise_g = 2e-3;  ///< of a sample, white
+    static constexpr double kRun_s = 60;      ///< each way
+    static constexpr double kSlew_deg_s = 7;  ///< increments have room for 7.28
+
+    ZerosAtARate() {
+        settings_.sample_s = 1 / GetParam();
+        settings_.zero.duration_s = kRun_s;
+        settings_.zero.slew_deg_per_s = kSlew_deg_s;
+        settings_.zero.velocity_reference_mps = 1e-4;
+        settings_.zero.position_reference_m = 1;
+        settings_.zero.target_mg = {5, 5, 5};
+        settings_.rig.accelerometer_g = kNoise_g;
+        truth_.sample_rate_hz = GetParam();
+        truth_.accelerometer_g = kNoise_g;
+        truth_.slew_deg_per_s = kSlew_deg_s;
+        truth_.slew_kick_g = 0;
+    }
+
+    /// Of a level accelerometer's zero over that of a mean: it has to be told from a tilt that
+    /// turns beneath it. By least squares c of c + A exp(-i psi) has 1 / (1 - |mean exp(i psi)|^2)
+    /// times the variance of a mean.
+    static double told_from_tilt() {
+        double psi_deg = 0, way = 1, cosine = 0, sine = 0;
+        constexpr int kSteps = 6000;
+        for (int i = 0; i < kSteps; ++i) {
+            psi_deg += way * kSlew_deg_s * kRun_s / kSteps;
+            if (std::abs(psi_deg) >= 88) way = psi_deg > 0 ? -1 : 1;
+            cosine += std::cos(psi_deg * std::numbers::pi / 180) / kSteps;
+            sine += std::sin(psi_deg * std::numbers::pi / 180) / kSteps;
+        }
+        return 1 / std::sqrt(1 - cosine * cosine - sine * sine);
+    }
+
+    Settings settings_;
+    plant::Truth truth_;
+};
+
+TEST_P(ZerosAtARate, AreAsUncertainAsTheNoiseOfSoManySamples) {
+    constexpr std::uint64_t kSeeds = 24;
+    // z is the mean of what its accelerometer shows either way up, its scale is their difference;
+    // likewise x and y.
+    const double mean_mg = 1e3 * kNoise_g / std::sqrt(2 * kRun_s * GetParam());
+    const std::array<double, 3> theory_mg{mean_mg * told_from_tilt(), mean_mg * told_from_tilt(),
+                                          mean_mg};
+    // The slews begin in the first of 60 updates. Tilts and gains of the level axes that are
+    // estimated beside their zeros make these less sure than that, the more the less the noise.
+    const std::array<double, 3> at_most{1.15, 1.15, 1.03};
+    std::array<double, 3> squares{};
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        SCOPED_TRACE(testing::Message() << "seed " << seed);
+        truth_.seed = seed + 1000 * static_cast<std::uint64_t>(GetParam());
+        std::mt19937_64 generator(truth_.seed);
+        std::uniform_real_distribution<double> within(-5e-3, 5e-3);
+        for (double& zero : truth_.zero_g) zero = within(generator);
+        ZeroCalibration zeroing(settings_.zero, settings_.rig, settings_.sample_s);
+        RigAtRest rig(truth_);
+        zeroing.begin();
+        ASSERT_EQ(rig.zero_all(zeroing, nullptr), "");
+        ASSERT_EQ(zeroing.finish(false), "");
+        const ZeroStatus found = zeroing.status();
+        for (std::size_t i = 0; i < 3; ++i) {
+            EXPECT_GT(found.sigma_mg[i], 0.99 * theory_mg[i]) << "xyz"[i];
+            EXPECT_LT(found.sigma_mg[i], at_most[i] * theory_mg[i]) << "xyz"[i];
+            squares[i] += std::pow((found.zero_mg[i] - 1e3 * truth_.zero_g[i]) / theory_mg[i], 2);
+        }
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_LT(squares[i], at_most[i] * at_most[i] * chi_square_999(kSeeds)) << "xyz"[i];
+        EXPECT_GT(squares[i], chi_square_001(kSeeds)) << "xyz"[i];
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Hz, ZerosAtARate, testing::Values(40.0, 100.0, 1000.0),
+                         [](const auto& of) { return std::to_string(static_cast<int>(of.param)); });
 
 TEST(LevelledZerosSoak, AHundredSeedsAreWithinTheirSigma) {
     for (const double error : {0.0, 0.02, 0.05, 0.1, 0.2}) {
