@@ -81,19 +81,18 @@ std::string difference(const Dwell& was, const Dwell& is) {
     return {};
 }
 
-/// What the campaign adds to the filter's result: zeros in the amplitudes' uncertainty, its mark.
-void qualify(const Campaign& campaign, ReplayResult& out) {
+}  // namespace
+
+void qualify(const Campaign& campaign, std::size_t done, estimator::Result& result) {
     std::vector<std::pair<int, double>> variances;
     const auto dwells = recorded_dwells(campaign);
-    for (std::size_t i = campaign.restarted_at; i < dwells.size() && i < out.dwells.size(); ++i) {
+    for (std::size_t i = campaign.restarted_at; i < dwells.size() && i < done; ++i) {
         const double sigma = dwells[i].order->level_sigma_g;
         if (sigma > 0) variances.emplace_back(dwells[i].order->run, sigma * sigma);
     }
-    estimator::widen_amplitudes(out.result, variances);
-    if (!campaign.mark.empty()) out.result.warnings.push_back("campaign marked: " + campaign.mark);
+    estimator::widen_amplitudes(result, variances);
+    if (!campaign.mark.empty()) result.warnings.push_back("campaign marked: " + campaign.mark);
 }
-
-}  // namespace
 
 estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
                                         const estimator::Settings& settings,
@@ -152,7 +151,9 @@ estimator::Result live_result(const Campaign& campaign, const estimator::Setting
         dwells::use_noise(identification, dwell.order->noise);
         feed_as_it_is(identification, campaign, dwell, {});
     }
-    return identification.result();
+    auto result = identification.result();
+    qualify(campaign, dwells.size(), result);
+    return result;
 }
 
 ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
@@ -228,13 +229,13 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     play_until(samples.size());
     take();
     out.result = player.book().identification().result();
-    qualify(campaign, out);
+    qualify(campaign, out.dwells.size(), out.result);
     out.found = decide ? player.book().noise().found() : campaign.found;
     if (out.found) {
         const dwells::Anew again = anew(campaign, settings, *out.found);
         out.live = std::exchange(out.result, again.result());
         take_estimate(again.identification(), out.anew.emplace());
-        qualify(campaign, out);
+        qualify(campaign, out.dwells.size(), out.result);
     }
     out.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;

@@ -55,6 +55,10 @@ void feed(estimator::Identification& identification, const Campaign& campaign,
 [[nodiscard]] dwells::Anew anew(const Campaign& campaign, const estimator::Settings& settings,
                                 const noise::Found& found, const OnStep& on_step = {});
 
+/// What the campaign adds to the filter's result of its first dwells, so many: zeros in the
+/// amplitudes' uncertainty, its mark.
+void qualify(const Campaign& campaign, std::size_t done, estimator::Result& result);
+
 /// With the noise that was in force in each dwell.
 [[nodiscard]] estimator::Result live_result(const Campaign& campaign,
                                             const estimator::Settings& settings);

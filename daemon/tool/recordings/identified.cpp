@@ -391,6 +391,7 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     }
     Found found =
         with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
+    record::qualify(campaign, dwells.size(), found.result);
     found.rows = identification.rows();
     found.sweeps = std::move(sweeps);
     return found;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/daemon/record/recording.hpp"
@@ -34,6 +35,34 @@ TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
     double& angle = campaign.samples[900].angle[1];
     angle = std::nextafter(angle, 1.0);
     EXPECT_GT(replay(campaign, settings, {}).different, 0U);
+}
+
+TEST_F(Recording, HasTheSameResultReplayedAndIdentified) {
+    // GIVEN a marked campaign whose zeros in place leave 1 % of the level unsure
+    Campaign campaign;
+    campaign.samples = samples(4000, drivers::kSecond);
+    campaign.mark = "a zero has moved";
+    for (const int position : {1, 2}) {
+        const std::size_t first = position == 1 ? 100 : 2100;
+        Order order{campaign.samples[first - 50].time,
+                    campaign.samples[first].time,
+                    campaign.samples[first + 1500].time,
+                    1,
+                    position,
+                    9.0,
+                    false};
+        order.level_sigma_g = 0.01;
+        order.noise = estimator::noise_levels({});
+        campaign.orders.push_back(order);
+    }
+    const auto replayed = replay(campaign, {}, {}).result;
+    const auto identified = live_result(campaign, {});
+    // THEN both say so, and once
+    ASSERT_EQ(identified.amplitudes.size(), 1U);
+    EXPECT_GT(identified.amplitudes[0].sigma_g, 0.009 * identified.amplitudes[0].amplitude_g);
+    EXPECT_EQ(identified.amplitudes[0].sigma_g, replayed.amplitudes.at(0).sigma_g);
+    EXPECT_EQ(identified.warnings, replayed.warnings);
+    EXPECT_EQ(std::ranges::count(identified.warnings, "campaign marked: a zero has moved"), 1);
 }
 
 }  // namespace
