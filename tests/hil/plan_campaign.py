@@ -3,6 +3,7 @@
 
 usage: plan_campaign.py PROGRAMS
 """
+import glob
 import json
 import os
 import subprocess
@@ -115,8 +116,19 @@ def restarted(checks, programs, folder):
         rig.stop()
 
 
+def comes_out_again(checks, programs, run, text):
+    recorded = glob.glob(os.path.join(os.path.dirname(run.path), "planned-*"))[0]
+    for how, arguments in (("replayed", ("replay", recorded)), ("identified", ("identify", recorded)),
+                           ("from the frames alone", ("replay", *r.raw_logs(recorded)))):
+        again = subprocess.run([os.path.join(programs, "vibrig"), *arguments, "--json"], stdin=subprocess.DEVNULL, capture_output=True,
+                               text=True, timeout=300)
+        checks.check(again.stdout and json.loads(again.stdout) == run.result, f"{text}: {how}, the result comes out to the last bit",
+                     f"{again.stderr}\n{again.stdout[:1000]}")
+
+
 def at_other_rates(checks, programs, folder):
-    """The rig samples at 100 Hz and at 1 kHz: what is promised before, and kept, is right there as it is at 40 Hz."""
+    """The rig samples at 100 Hz and at 1 kHz: what is promised before, and kept, is right there as it is at 40 Hz,
+    and comes out of the recording again."""
     plan = os.path.join(folder, "plan.json")   # of 28 dwells they know no more
     subprocess.run([os.path.join(programs, "vibrig"), "plan", "--levels", "0,6", "--runs", "12", "-o", plan],
                    capture_output=True, timeout=120, check=True)
@@ -125,6 +137,8 @@ def at_other_rates(checks, programs, folder):
         with tempfile.TemporaryDirectory() as place:
             run = Run(programs, {"plan": plan, **campaign}, place, 300, {"platform": {"sample_rate_hz": rate, **truth}},
                       can={"sample_rate_hz": float(rate)})
+            if run.result:
+                comes_out_again(checks, programs, run, text)
         if not run.finished(checks, f"a campaign {text} finishes"):
             continue
         promised = {c["name"]: c["sigma"] for c in run.plan.get("expected", [])}
