@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <functional>
 #include <iterator>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
