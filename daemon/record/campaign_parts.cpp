@@ -292,7 +292,7 @@ std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
         const Order& order = campaign.orders[i];
         if (order.cancel) continue;
         RecordedDwell dwell{&order, at(order.from), 0, false};
-        dwell.count = at(order.to) - dwell.first;
+        dwell.count = std::max(at(order.to), dwell.first) - dwell.first;
         const bool cancelled = i + 1 < campaign.orders.size() && campaign.orders[i + 1].cancel;
         // As many as the filter saw, wherever in time the end was ordered.
         if (done < campaign.dwells.size()) {

@@ -14,6 +14,8 @@
 #include <sstream>
 #include <utility>
 
+#include "proto/text.hpp"
+
 namespace vibrig::record::hdf5 {
 
 namespace {
@@ -105,6 +107,12 @@ std::vector<std::size_t> dimensions_of(const Handle& set) {
     std::vector<hsize_t> found(static_cast<std::size_t>(std::max(rank, 0)));
     H5Sget_simple_extent_dims(space.get(), found.data(), nullptr);
     return {found.begin(), found.end()};
+}
+
+/// Of an attribute; 0 where it has no values, or more dimensions than a length.
+hssize_t count_in(const Handle& attribute) {
+    const Handle space(H5Aget_space(attribute.get()), H5Sclose);
+    return space.get() < 0 ? 0 : H5Sget_simple_extent_npoints(space.get());
 }
 
 constexpr const char* kNames = "names";
@@ -233,9 +241,17 @@ std::string File::text(const std::string& object, const char* name) const {
                        H5Aclose);
     if (found.get() < 0) fail(object + ": attribute " + name);
     const Handle type(H5Aget_type(found.get()), H5Tclose);
-    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
+    if (H5Tget_class(type.get()) != H5T_STRING || count_in(found) != 1)
         throw Error(path_ + ": " + object + ": attribute " + name +
                     ": found no text, expected one");
+    if (H5Tis_variable_str(type.get()) > 0) {  // as h5py writes it
+        char* read = nullptr;
+        if (H5Aread(found.get(), type.get(), static_cast<void*>(&read)) < 0)
+            fail(object + ": attribute " + name);
+        std::string text = read == nullptr ? "" : read;
+        H5free_memory(read);
+        return text;
+    }
     std::string text(H5Tget_size(type.get()), '\0');
     if (H5Aread(found.get(), type.get(), text.data()) < 0) fail(object + ": attribute " + name);
     return text.c_str();
@@ -245,6 +261,9 @@ std::int64_t File::number(const std::string& object, const char* name) const {
     const Handle found(H5Aopen_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),
                        H5Aclose);
     std::int64_t number = 0;
+    if (found.get() >= 0 && count_in(found) != 1)
+        throw Error(path_ + ": " + object + ": attribute " + name +
+                    ": found no single number, expected one");
     if (found.get() < 0 || H5Aread(found.get(), H5T_NATIVE_INT64, &number) < 0)
         fail(object + ": attribute " + name);
     return number;
@@ -296,7 +315,13 @@ template <typename T>
 Array<T> File::read(const std::string& name, std::int64_t type) const {
     const Handle set = open_set(name);
     Array<T> array{dimensions_of(set), {}};
-    array.values.resize(count_of(array.dimensions));
+    const std::size_t count = count_of(array.dimensions);
+    try {
+        array.values.resize(count);
+    } catch (const std::exception&) {  // a dataset of a few bytes may say that it is longer
+        throw Error(path_ + ": " + name + ": found " + std::to_string(count) +
+                    " numbers, expected as many as there is memory for");
+    }
     if (!array.values.empty() &&
         H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()) < 0)
         fail(name);
@@ -349,7 +374,8 @@ std::vector<std::size_t> File::places(const std::string& name, const Names& name
         std::istringstream words(text(name, kNames));
         found.assign(std::istream_iterator<std::string>(words), {});
         if (found.size() != width)
-            refuse(numbers, std::to_string(found.size()) + " by its names " + joined(found));
+            refuse(numbers, std::to_string(found.size()) + " by its names " +
+                                proto::printable(joined(found)));
     }
     if (width == 0) refuse(numbers, "1 to " + most);
     if (width > found.size())
@@ -360,10 +386,10 @@ std::vector<std::size_t> File::places(const std::string& name, const Names& name
         const auto at = std::ranges::find(names.now, one) - names.now.begin();
         const auto place = static_cast<std::size_t>(at);
         if (place == names.now.size())
-            refuse(numbers + ", one of them " + one,
+            refuse(numbers + ", one of them " + proto::printable(one),
                    "at most " + most + "; a newer vibrigd wrote it");
         if (std::ranges::find(places, place) != places.end())
-            refuse(one + " twice among its names", "it once");
+            refuse(proto::printable(one) + " twice among its names", "it once");
         places.push_back(place);
     }
     return places;

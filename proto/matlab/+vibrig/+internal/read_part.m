@@ -43,6 +43,19 @@ for name = {'samples', 'orders', 'dwells', 'estimates', 'conditions', 'events', 
   part.(name{1}) = struct();
   if isfield(raw, name{1}), part.(name{1}) = table_of(raw.(name{1})); end
 end
+part = with_its_channels(part);
+end
+
+function part = with_its_channels(part)
+% Before recordings named their channels they had these, or the first of them.
+if ~isfield(part.samples, 'quality') || isempty(part.samples.quality), return, end
+width = size(part.samples.quality, 2);
+named = isfield(part.head, 'channels');
+if width > numel(part.channels) || (named && width < numel(part.channels))
+  error('vibrig:format', '%s: samples/quality: found %d numbers in a row, expected %d: %s', part.path, width, ...
+        numel(part.channels), strjoin(part.channels, ' '));
+end
+part.channels = part.channels(1:width);
 end
 
 function table = table_of(raw)

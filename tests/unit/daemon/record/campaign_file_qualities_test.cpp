@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
+#include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -172,6 +175,63 @@ TEST_F(CampaignFile, ThatContradictsItselfIsRefused) {
     // AND fewer rows than samples are as many samples, as in any column
     lie({kSamples - 2, 7}, {0});
     EXPECT_EQ(read_campaign(path_).samples.size(), kSamples - 2);
+}
+
+/// As other programs write attributes, and as a file that lies may have them.
+TEST_F(CampaignFile, WithAttributesThatAreNotOneValueIsRefusedOrRead) {
+    const std::string all = "outer inner azimuth accel_x accel_y accel_z table_accel";
+    // Takes the place of an attribute: `count` of this type.
+    const auto attribute = [&](const char* object, const char* name, hid_t type, hsize_t count,
+                               const void* values) {
+        const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        H5Adelete_by_name(file, object, name, H5P_DEFAULT);
+        const hid_t space = H5Screate_simple(1, &count, nullptr);
+        const hid_t made = H5Acreate_by_name(file, object, name, type, space, H5P_DEFAULT,
+                                             H5P_DEFAULT, H5P_DEFAULT);
+        EXPECT_GE(H5Awrite(made, type, values), 0);
+        H5Aclose(made);
+        H5Sclose(space);
+        H5Fclose(file);
+    };
+    const hid_t fixed = H5Tcopy(H5T_C_S1), variable = H5Tcopy(H5T_C_S1);
+    H5Tset_size(fixed, 8);
+    H5Tset_size(variable, H5T_VARIABLE);
+    // GIVEN an array of texts where one is expected
+    write();
+    const std::vector<char> texts(8 * 4096, 'x');
+    attribute(kQuality, "names", fixed, 4096, texts.data());
+    EXPECT_EQ(refusal(),
+              path_ + ": " + kQuality + ": attribute names: found no text, expected one");
+    // AND an array of numbers
+    fs::remove(path_);
+    write();
+    const std::vector<std::int64_t> numbers(4096, 1);
+    attribute("/", "format_version", H5T_NATIVE_INT64, 4096, numbers.data());
+    EXPECT_EQ(refusal(),
+              path_ + ": /: attribute format_version: found no single number, expected one");
+    // AND a text of variable length, as h5py writes it
+    fs::remove(path_);
+    write();
+    const char* words = all.c_str();
+    attribute(kQuality, "names", variable, 1, static_cast<const void*>(&words));
+    EXPECT_EQ(read_campaign(path_).samples.size(), kSamples);
+    // AND names that a terminal would obey
+    lie({kSamples, 1}, {0}, "\033[2Jouter");
+    EXPECT_THAT(refusal(), HasSubstr(R"(one of them \x1b[2Jouter)"));
+    H5Tclose(fixed);
+    H5Tclose(variable);
+}
+
+TEST_F(CampaignFile, OfMoreRowsThanThereIsMemoryForIsRefused) {
+    write();
+    const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t quality = H5Dopen2(file, kQuality, H5P_DEFAULT);
+    const std::array<hsize_t, 2> size{hsize_t{1} << 60, 7};
+    EXPECT_GE(H5Dset_extent(quality, size.data()), 0);
+    H5Dclose(quality);
+    H5Fclose(file);
+    EXPECT_THAT(refusal(), AllOf(HasSubstr(path_ + ": " + kQuality),
+                                 HasSubstr("expected as many as there is memory for")));
 }
 
 /// A build with one column more and one number more in a row goes on with an older one's table.

@@ -37,6 +37,20 @@ TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
     EXPECT_GT(replay(campaign, settings, {}).different, 0U);
 }
 
+TEST_F(Recording, ThatOrdersADwellToEndBeforeItBeginsHasNoSampleInIt) {
+    Campaign campaign;
+    campaign.samples = samples(4000, drivers::kSecond);
+    campaign.orders.push_back({campaign.samples[1900].time, campaign.samples[2000].time,
+                               campaign.samples[100].time, 1, 1, 9.0, false});
+    const auto dwells = recorded_dwells(campaign);
+    ASSERT_EQ(dwells.size(), 1U);
+    EXPECT_EQ(dwells[0].count, 0U);
+    EXPECT_EQ(live_result(campaign, {}).samples, 0U);
+    const auto replayed = replay(campaign, {}, {});
+    ASSERT_EQ(replayed.dwells.size(), 1U);
+    EXPECT_EQ(replayed.dwells[0].reason, "no samples");
+}
+
 TEST_F(Recording, HasTheSameResultReplayedAndIdentified) {
     // GIVEN a marked campaign whose zeros in place leave 1 % of the level unsure
     Campaign campaign;
