@@ -93,6 +93,17 @@ plant::Truth truth_of(const Json& base, const std::vector<RigSetting>& rig, std:
     return plant::parse_truth(truth.dump(), "rig");
 }
 
+double rate_of(const configuration::Configuration& c) {
+    return 1 / drivers::to_seconds(c.assembler.sample_period);
+}
+
+/// A rig that samples as the configuration says; what a study states of its rig comes on top.
+Json base_of(const configuration::Configuration& c) {
+    plant::Truth truth;
+    truth.sample_rate_hz = rate_of(c);
+    return Json::parse(plant::to_json(truth));
+}
+
 plant::CampaignPlan plan_of(const configuration::Configuration& c,
                             const std::vector<std::size_t>& sequence) {
     plant::CampaignPlan plan;
@@ -296,9 +307,9 @@ const CampaignWorker::Point& CampaignWorker::point_of(std::uint64_t index) {
     const auto place = study_.place_of(number);
     auto next = std::make_unique<Point>();
     next->number = number;
-    next->base = Json::parse(plant::to_json(plant::Truth{}));
-    next->rig = rig_at(study_, place);
     const auto loaded = load_settings(settings_at(study_, place), "study");
+    next->base = base_of(loaded.configuration);
+    next->rig = rig_at(study_, place);
     next->settings = loaded.configuration.estimator;
     next->plan = plan_of(loaded.configuration, sequences_.at(combination_of(study_, number)));
     point_ = std::move(next);
@@ -329,12 +340,12 @@ double expected_task_s(const Study& study, const Sequences& sequences) {
     for (double at = 0; at < points; at += std::max(1.0, points / kMostPoints)) {
         const auto point = static_cast<std::uint64_t>(at);
         const auto place = study.place_of(point);
-        double rate_hz = plant::Truth{}.sample_rate_hz;
+        const auto loaded = load_settings(settings_at(study, place), "study");
+        double rate_hz = rate_of(loaded.configuration);
         for (const RigSetting& setting : rig_at(study, place)) {
             if (setting.key == "platform.sample_rate_hz" && !setting.json.empty())
                 rate_hz = Json::parse(setting.json).get<double>();
         }
-        const auto loaded = load_settings(settings_at(study, place), "study");
         sum_s += static_cast<double>(sequences.at(combination_of(study, point)).size()) *
                  loaded.configuration.campaign.dwell_s * rate_hz * kSample_s;
         ++count;

@@ -265,6 +265,25 @@ TEST(StudyCampaigns, AreWhatTheEstimatorMakesOfTheSimulatedRig) {
     EXPECT_LT(record.nees_a, 71);
 }
 
+TEST(StudyCampaigns, SampleAsTheConfigurationSays) {
+    const auto run = [](const std::string& more) {
+        const Study study = parse_study(
+            "[study]\nname='a'\nkind='campaigns'\nseed=3\n[campaign]\ndwell_s=5\n" + more,
+            "S.toml");
+        const auto checked = check_campaigns(study, "S.toml");
+        CampaignWorker worker(study, checked.sequences);
+        const CampaignRecord record = decode(worker.run(0));
+        EXPECT_EQ(record.failed, "");
+        return record.error;
+    };
+    const std::string configured = "[identify]\ncan.sample_rate_hz=100\n";
+    const auto error = run(configured);
+    EXPECT_EQ(error, run(configured + "[rig]\nplatform.sample_rate_hz=100\n"));
+    EXPECT_NE(error, run(""));
+    // What is stated of the rig is so, whatever the configuration believes
+    EXPECT_EQ(run("[rig]\nplatform.sample_rate_hz=40\n"), run(""));
+}
+
 /// As in a live campaign: the filter takes the angles' noise from the dwells before.
 TEST(StudyCampaigns, LearnTheNoiseFromTheDwellsBefore) {
     const auto u_with = [](const std::string& noise) {
