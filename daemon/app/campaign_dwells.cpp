@@ -152,7 +152,7 @@ void CampaignDwells::end(bool complete) {
 
 void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
                                       campaign::Campaign& campaign) {
-    // Somebody looks at the noise when it goes on, though nobody hears of it again.
+    // The monitor shows its curves again when the campaign goes on; what it said was said before.
     Interrupted fresh{
         dwells::DwellBook(configuration_.estimator, [](Severity, const std::string&) {}),
         unfinished.id};

@@ -78,8 +78,10 @@ std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
                 ? "no journal is kept"
                 : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
                                   [&](const journal::DwellCheckpoint& dwell) {
+                                      const auto& all = dwell.measurements;
                                       dwells::feed(
-                                          identification, dwell.info, dwell.measurements, false,
+                                          identification, dwell.info, all.size(),
+                                          [&all](std::size_t n) { return all[n]; }, false,
                                           [](std::size_t, const estimator::StepResult&) {});
                                   });
         auto found = anew.result();

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <optional>
-#include <ranges>
 #include <string>
 
 #include "daemon/noise/noise_monitor.hpp"
@@ -12,17 +11,15 @@
 
 namespace vibrig::dwells {
 
-/// One dwell into a filter with the noise in force, what was played in it included: measurement by
-/// measurement, `each(n, step)` hears of them. As live the filter never hears of a dwell without
-/// any.
-template <std::ranges::input_range Measurements, typename Each>
+/// One dwell of `count` measurements, measurement(n), into a filter with the noise in force, what
+/// was played in it included; `each(n, step)` hears of them. As live the filter never hears of a
+/// dwell without any.
+template <typename Measurement, typename Each>
 void feed(estimator::Identification& identification, const estimator::DwellInfo& dwell,
-          const Measurements& measurements, bool cut_short, const Each& each) {
-    if (std::ranges::empty(measurements)) return;
+          std::size_t count, const Measurement& measurement, bool cut_short, const Each& each) {
+    if (count == 0) return;
     identification.begin_dwell(dwell);
-    std::size_t n = 0;
-    for (const estimator::Measurement& measurement : measurements)
-        each(n++, identification.add(measurement));
+    for (std::size_t n = 0; n < count; ++n) each(n, identification.add(measurement(n)));
     static_cast<void>(identification.end_dwell(cut_short));
     if (dwell.played) static_cast<void>(identification.played(*dwell.played));
 }

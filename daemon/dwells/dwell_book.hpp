@@ -15,10 +15,11 @@
 namespace vibrig::dwells {
 
 /// The book of a campaign's dwells: the filter that takes them, the noise monitor that judges each,
-/// and in which order one follows from the other when a dwell is over. Every dwell goes through it,
-/// live, of a campaign that is resumed, of a recording and of a study, so that all of them come to
-/// the same state, to the last bit. Control thread only, but for the filter, which is the
-/// estimator's while a dwell is ordered.
+/// and in which order one follows from the other when a dwell is over. Dwells go through it that
+/// are measured, resumed from the journal, replayed from a recording or simulated in a study, so
+/// that all of them come to the same state, to the last bit. Where the noise is known for all of
+/// them there is nothing to decide between two dwells: feed() in anew.hpp is enough. Control thread
+/// only, but for the filter, which is the estimator's while a dwell is ordered.
 class DwellBook {
   public:
     enum class Noise : std::uint8_t {
@@ -66,7 +67,8 @@ class DwellBook {
     /// swept through included.
     [[nodiscard]] estimator::DwellSummary take_again(const Again& dwell);
 
-    /// What is kept beside the filter for coefficients over frequency.
+    /// What is kept beside the filter for coefficients over frequency. The control thread enters
+    /// what was measured, since bands need the rig's configuration; take_again() its sweeps.
     struct Spectrum {
         std::vector<estimator::spectrum::Sweep> sweeps;
         /// Bands at the platform of its random dwells whose PSD was told, by DwellRow::psd.

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <stdexcept>
 #include <thread>
@@ -34,14 +33,15 @@ void take_estimate(const estimator::Identification& identification, Dwell& to) {
 void feed_as_it_is(estimator::Identification& identification, const Campaign& campaign,
                    const RecordedDwell& dwell, const OnStep& on_step) {
     const Order& order = *dwell.order;
-    const auto measurements = std::span(campaign.samples).subspan(dwell.first, dwell.count) |
-                              std::views::transform([&order](const drivers::Sample& sample) {
-                                  return rt::measurement_of(sample, order.from, order.zero_g);
-                              });
-    dwells::feed(identification, order.dwell(), measurements, dwell.cut_short,
-                 [&](std::size_t n, const estimator::StepResult& step) {
-                     if (on_step) on_step(dwell.first + n, step);
-                 });
+    dwells::feed(
+        identification, order.dwell(), dwell.count,
+        [&](std::size_t n) {
+            return rt::measurement_of(campaign.samples[dwell.first + n], order.from, order.zero_g);
+        },
+        dwell.cut_short,
+        [&](std::size_t n, const estimator::StepResult& step) {
+            if (on_step) on_step(dwell.first + n, step);
+        });
 }
 
 /// One finished dwell as a recording has it, if there is one; `order`: the newest.

@@ -530,8 +530,11 @@ TEST_F(DwellBookTest, IdentifiedAnewFromJournalAndRecordingItIsTheSame) {
     const auto& dwells = journal.recovery().campaign->dwells;
     Anew of_journal(estimator::Settings{}, *found, dwells.size());
     for (const auto& dwell : dwells) {
-        feed(of_journal.identification(), dwell.info, dwell.measurements, false,
-             [](std::size_t, const estimator::StepResult&) {});
+        const auto& all = dwell.measurements;
+        feed(
+            of_journal.identification(), dwell.info, all.size(),
+            [&all](std::size_t n) { return all[n]; }, false,
+            [](std::size_t, const estimator::StepResult&) {});
     }
     auto campaign = record::read_campaign(folder_.string());
     record::place_played(campaign);
