@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <string>
 
-#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/calibration.hpp"
 
 namespace vibrig::estimator::zeros {
