@@ -56,12 +56,14 @@ TEST(RandomRegisters, EachMissingOrUnfitRoleIsNamed) {
                 HasSubstr("control_state.type: found bits"));
 }
 
-const std::string kPsdBlock =
-    kRandomRegisters +
-    "psd_block = { address = 100, word_order = \"little\", pairs = 300, attempts = 3 }\n";
+/// A function, since another file's text need not be there before main().
+std::string psd_block_keys() {
+    return kRandomRegisters +
+           "psd_block = { address = 100, word_order = \"little\", pairs = 300, attempts = 3 }\n";
+}
 
 TEST(PsdBlock, IsWhereItIsStated) {
-    const std::string text = "spectrum.controller_psd = \"registers\"\n" + kPsdBlock;
+    const std::string text = "spectrum.controller_psd = \"registers\"\n" + psd_block_keys();
     const auto c = accepted(text, true);
     ASSERT_TRUE(c.shaker.registers.random && c.shaker.registers.random->psd_block);
     const proto::PsdBlock& block = *c.shaker.registers.random->psd_block;
@@ -71,7 +73,7 @@ TEST(PsdBlock, IsWhereItIsStated) {
     EXPECT_EQ(block.pairs, 300);
     EXPECT_EQ(block.attempts, 3);
     EXPECT_TRUE(c.campaign.read_psd);
-    EXPECT_FALSE(accepted(kPsdBlock, true).campaign.read_psd);
+    EXPECT_FALSE(accepted(psd_block_keys(), true).campaign.read_psd);
     const auto shown = format_effective(parse(as_simulated(text, true), "rig.toml", true));
     EXPECT_THAT(shown, HasSubstr("shaker.registers.psd_block.pairs"));
     const auto none =
