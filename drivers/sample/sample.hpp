@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <type_traits>
 
 #include "drivers/base/clock.hpp"
@@ -50,6 +51,36 @@ struct alignas(64) Sample {
 };
 static_assert(std::is_trivially_copyable_v<Sample>);
 static_assert(sizeof(Sample) == 128, "two cache lines per sample");
+
+/// Which DBC signal carries what, as "Message.Signal"; empty: not bound. The defaults are those of
+/// proto/rig.dbc.
+struct SignalBindings {
+    /// Full counter; wraps at the signal's width. Without one, frames within half a period form a
+    /// sample.
+    std::string sync_count = "Sync.SyncCount";
+    std::string outer = "Resolvers.Outer", inner = "Resolvers.Inner",
+                azimuth = "ResolverAzimuth.Azimuth";  ///< deg
+    std::string outer_valid = "Resolvers.OuterValid", inner_valid = "Resolvers.InnerValid",
+                azimuth_valid = "ResolverAzimuth.AzimuthValid";
+    std::string accel_x = "AccelerometersXY.X", accel_y = "AccelerometersXY.Y",
+                accel_z = "AccelerometerZ.Z";  ///< g
+    std::string accel_x_valid = "AccelerometersXY.XValid",
+                accel_y_valid = "AccelerometersXY.YValid", accel_z_valid = "AccelerometerZ.ZValid";
+    std::string table_accel = "TableAccelerometer.Axial";  ///< g
+    /// In any message with a channel: the low bits of the sync count it belongs to.
+    std::string message_sync_signal = "SyncLow";
+    std::string loop_closed = "PlatformStatus.LoopClosed",
+                gyros_at_speed = "PlatformStatus.GyrosAtSpeed", ready = "PlatformStatus.Ready",
+                fault = "PlatformStatus.Fault", temperature = "PlatformStatus.Temperature";
+    std::string in_position = "GimbalStatus.InPosition", slewing = "GimbalStatus.Slewing",
+                command_echo = "GimbalStatus.CommandEcho";
+    /// degC. Left as they are they may be missing in the DBC: they are recorded, nothing depends
+    /// on them.
+    std::string temperature_case = "PlatformTemperatures.Case",
+                temperature_gyro_x = "PlatformTemperatures.GyroX",
+                temperature_gyro_y = "PlatformTemperatures.GyroY",
+                temperature_gyro_z = "PlatformTemperatures.GyroZ";
+};
 
 /// Temperatures beside the inner element's, in the order of PlatformStatus::sensor_c.
 inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x", "gyro y",
