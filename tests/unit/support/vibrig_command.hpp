@@ -25,6 +25,9 @@ class VibrigCommand : public ::testing::Test {
         text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
         return text.str();
     }
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
     /// Its exit code; what it printed is in `out` and `error`.
     int vibrig(const std::string& arguments) {
         const std::string command =

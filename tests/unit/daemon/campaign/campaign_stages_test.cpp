@@ -10,6 +10,7 @@
 #include "estimator/filter/angles.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
 #include "tests/unit/daemon/interlock/fake_shaker.hpp"
+#include "tests/unit/drivers/rig_frames.hpp"
 
 namespace vibrig::campaign {
 namespace {
@@ -27,21 +28,6 @@ double signal(const proto::Dbc& dbc, const char* message, const char* name,
               const canfd_frame& frame) {
     return *proto::decode(*dbc.find(std::string_view(message))->find(name),
                           std::span(frame.data, frame.len));
-}
-
-drivers::ReceivedFrame frame_of(const proto::Dbc& dbc, const char* message,
-                                std::initializer_list<std::pair<const char*, double>> values,
-                                Time time) {
-    const proto::Message* m = dbc.find(std::string_view(message));
-    drivers::ReceivedFrame received;
-    received.time = time;
-    received.frame.can_id = m->id;
-    received.frame.len = m->size;
-    for (const auto& [name, value] : values) {
-        static_cast<void>(proto::encode(*m->find(name), value,
-                                        std::span(received.frame.data, received.frame.len)));
-    }
-    return received;
 }
 
 constexpr double kSample_s = 0.025;
@@ -164,8 +150,8 @@ struct StagesTest : testing::Test, drivers::CanPort {
         platform.in_position = slews && slewed_s >= 2;
         const bool torquing = says_torquing || torque != std::array<double, 3>{};
         static_cast<void>(feed->take(
-            frame_of(dbc, "GimbalStatus",
-                     {{"Torquing", torquing ? 1 : 0}, {"TorqueEcho", torque_echo}}, now)));
+            test::frame_of(dbc, "GimbalStatus", now,
+                           {{"Torquing", torquing ? 1 : 0}, {"TorqueEcho", torque_echo}})));
         drivers::Sample sample;
         sample.time = now;
         sample.force = up;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/filter/angles.hpp"
+#include "tests/unit/drivers/rig_frames.hpp"
 
 namespace vibrig::rt {
 namespace {
@@ -18,21 +19,6 @@ namespace {
 using drivers::kMillisecond;
 using drivers::kSecond;
 using drivers::Time;
-
-drivers::ReceivedFrame frame_of(const proto::Dbc& dbc, const char* message,
-                                std::initializer_list<std::pair<const char*, double>> values,
-                                Time time) {
-    const proto::Message* m = dbc.find(std::string_view(message));
-    drivers::ReceivedFrame received;
-    received.time = time;
-    received.frame.can_id = m->id;
-    received.frame.len = m->size;
-    for (const auto& [name, value] : values) {
-        static_cast<void>(proto::encode(*m->find(name), value,
-                                        std::span(received.frame.data, received.frame.len)));
-    }
-    return received;
-}
 
 TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {
     const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
@@ -44,11 +30,12 @@ TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {
     drivers::Sample sample;
     feed.take(sample);
     const auto gyro = [&](int counter, Time t) {
-        return feed.take(frame_of(dbc, "GyroIncrements", {{"X", 2.0}, {"Counter", counter}}, t));
+        return feed.take(
+            test::frame_of(dbc, "GyroIncrements", t, {{"X", 2.0}, {"Counter", counter}}));
     };
     const auto force = [&](int counter, Time t) {
-        return feed.take(
-            frame_of(dbc, "AccelerometerIncrements", {{"Z", 0.098}, {"Counter", counter}}, t));
+        return feed.take(test::frame_of(dbc, "AccelerometerIncrements", t,
+                                        {{"Z", 0.098}, {"Counter", counter}}));
     };
     // Not asked for: taken off the way of the samples, counted, not given out.
     EXPECT_TRUE(gyro(0, kSecond));

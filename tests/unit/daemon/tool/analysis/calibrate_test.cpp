@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/unit/estimator/plan/calibration_readings.hpp"
+#include "tests/unit/support/vibrig_command.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -26,29 +27,9 @@ using estimator::plan::readings;
 using estimator::plan::Vec3;
 using Json = nlohmann::json;
 
-class CalibrateCommand : public ::testing::Test {
+class CalibrateCommand : public vibrig::test::VibrigCommand {
   protected:
-    CalibrateCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~CalibrateCommand() override { std::filesystem::remove_all(folder_); }
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content_of("out");
-        error = content_of("error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
-    std::string content_of(const std::string& name) const {
-        std::ostringstream text;
-        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
-        return text.str();
-    }
-    void write(const std::string& name, const std::string& text) const {
-        std::ofstream(folder_ / name, std::ios::binary) << text;
-    }
+    using VibrigCommand::write;
     void write(const std::string& name, const std::vector<Reading>& list) const {
         std::ostringstream text;
         text.precision(17);
@@ -57,9 +38,6 @@ class CalibrateCommand : public ::testing::Test {
             text << r.input[0] << ',' << r.input[1] << ',' << r.input[2] << ',' << r.output << '\n';
         write(name, text.str());
     }
-
-    std::filesystem::path folder_;
-    std::string out, error;
 };
 
 TEST_F(CalibrateCommand, FillsInTheFileThatThePlanWrote) {
@@ -71,7 +49,7 @@ TEST_F(CalibrateCommand, FillsInTheFileThatThePlanWrote) {
     EXPECT_EQ(plan["rank"], 10);
     EXPECT_GT(plan["d_efficiency"], 0.98);
     // WHEN the outputs are filled in
-    std::istringstream lines(content_of("turntable.csv"));
+    std::istringstream lines(content("turntable.csv"));
     std::ostringstream filled;
     filled.precision(17);
     std::string line;
@@ -97,7 +75,7 @@ TEST_F(CalibrateCommand, FillsInTheFileThatThePlanWrote) {
                     kSigma * plan["unit_standard_errors"][kTermNames[k]].get<double>(), 1e-12);
         EXPECT_NEAR(c["value"].get<double>(), kTruth[k], 4.5 * c["sigma"].get<double>());
     }
-    EXPECT_EQ(content_of("r.svg").substr(0, 4), "<svg");
+    EXPECT_EQ(content("r.svg").substr(0, 4), "<svg");
     EXPECT_EQ(vibrig("calibrate filled.csv --sigma 2e-6"), 0);
     EXPECT_NE(out.find("the model holds"), std::string::npos) << out;
 }

@@ -34,11 +34,11 @@ class SweepsCommand : public SurveyCommand {
     }
     /// `vibrigd --check` of a configuration with this plan; its complaint, if any.
     std::string check(const std::string& rig, const std::string& plan) {
-        write("check.toml", "campaign.plan = \"" + path(plan) + "\"\n" + text_of(rig));
+        write("check.toml", "campaign.plan = \"" + path(plan) + "\"\n" + content(rig));
         const std::string command = "cd '" + folder_.string() +
                                     "' && '" VIBRIGD "' --config check.toml --check >out 2>error";
         const int status = std::system(command.c_str());
-        return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? "" : text_of("error") + "?";
+        return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? "" : content("error") + "?";
     }
     std::vector<SurveyJson> sweeps() const {
         std::vector<SurveyJson> swept;
@@ -104,7 +104,7 @@ TEST_F(SweepsCommand, VibrigdTakesThePlan) {
     EXPECT_EQ(check("pads.toml", "pads.json"), "");
     // Judged from its file it is the same.
     ASSERT_EQ(vibrig("plan --evaluate hard.json --config hard.toml --json"), 0) << error;
-    const SurveyJson judged = json(), planned = SurveyJson::parse(text_of("hard.json"));
+    const SurveyJson judged = json(), planned = SurveyJson::parse(content("hard.json"));
     EXPECT_EQ(judged["runs"], planned["runs"]);
     EXPECT_EQ(judged["standard_errors"], planned["standard_errors"]);
     EXPECT_NEAR(judged["duration_s"], planned["duration_s"].get<double>(), 1e-6);
@@ -140,13 +140,13 @@ TEST_F(SweepsCommand, TheLevelIsWhatNoFrequencyForbids) {
               0)
         << error;
     EXPECT_EQ(json()["sweeps"]["table_g"], 3.0);
-    write("cut.toml", text_of("hard.toml") + "accelerometer.range_g = 5\n");
+    write("cut.toml", content("hard.toml") + "accelerometer.range_g = 5\n");
     ASSERT_EQ(vibrig("plan --sweeps 20,60 --frequencies 15 --config cut.toml --json"), 0) << error;
     EXPECT_EQ(json()["sweeps"]["table_g"], 4.0);
     EXPECT_NE(warnings().find("accelerometer.range_g leaves 4 g of 6 g"), std::string::npos)
         << warnings();
     // Measured, with a bump between the ends: that is where the platform has most.
-    write("bump.toml", text_of("pads.toml") +
+    write("bump.toml", content("pads.toml") +
                            "spectrum.transmission = [[10, 1], [20, 0.4], [30, 0.8], [60, 0.1]]\n");
     ASSERT_EQ(vibrig("plan --sweeps 20,60 --frequencies 15 --config bump.toml --json"), 0) << error;
     EXPECT_NEAR(json()["sweeps"]["table_g"], 7.5, 1e-9);
@@ -163,9 +163,9 @@ TEST_F(SweepsCommand, WhatIsMissingIsSaid) {
 TEST_F(SweepsCommand, WrongInputIsOneClearError) {
     write("hundred.toml", "spectrum.mount = \"hard\"\ncan.sample_rate_hz = 100\n");
     write("forty.toml", "spectrum.mount = \"hard\"\n");
-    write("dull.toml", text_of("hard.toml") + "accelerometer.bandwidth_hz = 100\n");
+    write("dull.toml", content("hard.toml") + "accelerometer.bandwidth_hz = 100\n");
     write("short.toml",
-          text_of("pads.toml") + "spectrum.transmission = [[14, 0.7], [30, 0.3], [50, 0.1]]\n");
+          content("pads.toml") + "spectrum.transmission = [[14, 0.7], [30, 0.3], [50, 0.1]]\n");
     write("axes.csv",
           "alpha_deg,beta_deg,gamma_deg\n0,0,0\n90,0,0\n180,0,0\n270,0,0\n0,0,90\n90,0,90\n");
     const std::map<std::string, std::string> told{

@@ -1,14 +1,11 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "daemon/plan/plan_file.hpp"
+#include "tests/unit/support/vibrig_command.hpp"
 
 namespace {
 
@@ -18,36 +15,9 @@ constexpr const char* kTable1 =
     "alpha_deg,beta_deg,gamma_deg\n0,0,0\n0,0,45\n0,0,90\n0,0,180\n180,0,45\n45,0,0\n45,0,90\n"
     "90,0,90\n90,0,180\n180,0,270\n270,0,0\n270,0,90\n-45,0,0\n-45,0,90\n";
 
-/// Runs the real program in a folder of its own.
-class PlanCommand : public ::testing::Test {
+class PlanCommand : public vibrig::test::VibrigCommand {
   protected:
-    PlanCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~PlanCommand() override { std::filesystem::remove_all(folder_); }
-
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content_of("out");
-        error = content_of("error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
     Json json() const { return Json::parse(out); }
-    void write(const std::string& name, const std::string& text) const {
-        std::ofstream(folder_ / name, std::ios::binary) << text;
-    }
-    std::string content_of(const std::string& name) const {
-        std::ostringstream text;
-        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
-        return text.str();
-    }
-
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
 };
 
 TEST_F(PlanCommand, MakesPlansWhoseFileComesBackUnchanged) {
@@ -67,7 +37,7 @@ TEST_F(PlanCommand, MakesPlansWhoseFileComesBackUnchanged) {
     }
     EXPECT_EQ(count, 20U);
     EXPECT_GT(plan["duration_s"], 2000.0);
-    EXPECT_NE(content_of("sphere.svg").find("<svg"), std::string::npos);
+    EXPECT_NE(content("sphere.svg").find("<svg"), std::string::npos);
     // AND judged from its file it is the same plan
     ASSERT_EQ(vibrig("plan --evaluate plan.json --levels 0,2,4,4.667,6 --json"), 0) << error;
     EXPECT_NEAR(json()["d_efficiency"], plan["d_efficiency"].get<double>(), 1e-9);
