@@ -126,8 +126,8 @@ void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
     campaign_.climb_next_proof(first_shaking());
     if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
         if (why == book_.refusal(utc_now(), last_part_for(waiting.request)))
-            keep_commissioned({"", "", waiting.request.by, "", "refused arm",
-                               commission::Json{{"why", why}}.dump()});
+            commissioning_.enter({"", "", waiting.request.by, "", "refused arm",
+                                  commission::Json{{"why", why}}.dump()});
         return answer(waiting, {false, why});
     }
     if (!journal_) {  // on the rig's clock

@@ -37,7 +37,8 @@ void ControlLoop::watch_device(Time now) {
         if (part.proven || !were[static_cast<std::size_t>(part.part)].proven) continue;
         log(Severity::alarm, "commissioning",
             fmt::format("{} is void: {}", name_of(part.part), part.why));
-        keep_commissioned({name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
+        commissioning_.enter(
+            {name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
     }
     if (!before.empty() && !campaign_.armed_by().empty())
         static_cast<void>(campaign_.command(

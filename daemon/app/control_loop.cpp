@@ -48,7 +48,7 @@ void ControlLoop::run() {
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
         take_proof();
         void_gyros(dwells_.take_against_certificate());
-        const Time commissioning = step_commissioning(now);
+        const Time commissioning = commissioning_.step(now);
         dwells_.take_done(campaign_);
         watch_arming();
         supervisor_.check_balance(now);
@@ -74,7 +74,7 @@ void ControlLoop::show(Time now) {
     const std::lock_guard lock(mutex_);
     // Nobody is to see "finished" before there is a result.
     if (!dwells_.concluding()) campaign_.fill(status_, now);
-    if (procedure_ && procedure_->active()) status_.reason = procedure_->progress();
+    if (commissioning_.active()) status_.reason = commissioning_.progress();
     status_.interlock.latches = latches_.open();
     status_.noise = dwells_.noise();
     outside_.armed(!status_.armed_by.empty(), highest_level());

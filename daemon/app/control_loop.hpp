@@ -10,12 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "daemon/app/commissioning.hpp"
 #include "daemon/app/outside.hpp"
 #include "daemon/app/parts.hpp"
 #include "daemon/app/supervisor.hpp"
 #include "daemon/commission/book.hpp"
-#include "daemon/commission/procedure.hpp"
-#include "daemon/commission/progress.hpp"
 #include "daemon/commission/shaker_parts.hpp"
 #include "daemon/journal/latches.hpp"
 
@@ -85,6 +84,7 @@ class ControlLoop {
     /// Likewise with a certificate that was issued (control_certificates.cpp).
     void begin_certificate(WaitingCommand waiting);
     void finish_certificates(bool at_once);
+    [[nodiscard]] bool first_shaking() const;
     void watch_arming();
     void end_arming(const std::string& why);
     [[nodiscard]] std::string journal_being_verified() const;
@@ -111,19 +111,8 @@ class ControlLoop {
 
     // What commissioning asks and tells (control_commission.cpp).
     void commission(WaitingCommand waiting, drivers::Time now);
-    [[nodiscard]] CommandReply do_commission(const CommandRequest& request,
-                                             const commission::Json& what, drivers::Time now);
-    [[nodiscard]] CommandReply begin_commissioning(const CommandRequest& request,
-                                                   const commission::Json& what, drivers::Time now);
-    [[nodiscard]] commission::Progress progress() const;
-    void keep_commissioned(journal::Commissioned row);
-    void end_procedure(drivers::Time now);
-    [[nodiscard]] bool first_shaking() const;
-    void take_increments();
-    [[nodiscard]] commission::Ports procedure_ports();
-    [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
-    /// Returns when to be called next at the latest.
-    [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
+    /// Of record and procedure.
+    [[nodiscard]] std::string read_commissioning(const commission::Json& what);
 
     // The record, which arming demands (control_record.cpp).
     [[nodiscard]] CommandReply enter_in_record(const CommandRequest& request,
@@ -174,8 +163,7 @@ class ControlLoop {
     campaign::Campaign& campaign_ = parts_.campaign;
 
     commission::Book book_{loaded_};
-    std::unique_ptr<commission::Procedure> procedure_;  ///< made when it is asked for
-    std::array<double, 3> counted_rad_{};  ///< by the gyros, while commissioning has them count
+    Commissioning commissioning_{parts_, outside_, book_};
     /// Of a proof that a tool waits for: it ends with the tool.
     struct Attendance {
         std::string by;

@@ -38,9 +38,9 @@ void ControlLoop::keep_trials() {
         const auto lines = commission::TrialLog::take(configuration_.commission.folder);
         for (const Json& line : lines) {
             const std::string by = line.value("by", ""), who = line.value("identity", "");
-            keep_commissioned({name_of(Part::registers), "4",
-                               who.empty() ? by : by + " (" + who + ")", "", line.value("what", ""),
-                               line.dump()});
+            commissioning_.enter({name_of(Part::registers), "4",
+                                  who.empty() ? by : by + " (" + who + ")", "",
+                                  line.value("what", ""), line.dump()});
         }
         if (!lines.empty())
             log(Severity::info, "commissioning",
@@ -57,7 +57,7 @@ void ControlLoop::keep_trials() {
 void ControlLoop::keep_voided() {
     for (const auto& part : book_.standing(utc_now()))
         if (part.record && !part.proven)
-            keep_commissioned(
+            commissioning_.enter(
                 {name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
 }
 
@@ -68,7 +68,7 @@ void ControlLoop::void_gyros(const std::string& why) {
     try {
         book_.withdraw(Part::gyros);
         log(Severity::alarm, "commissioning", "gyros is to be proven anew: " + why);
-        keep_commissioned({name_of(Part::gyros), "", "", "", "void", Json{{"why", why}}.dump()});
+        commissioning_.enter({name_of(Part::gyros), "", "", "", "void", Json{{"why", why}}.dump()});
     } catch (const std::exception& error) {
         log(Severity::alarm, "commissioning",
             std::string("gyros is to be proven anew, and cannot be taken out: ") + error.what());
@@ -111,8 +111,9 @@ std::string ControlLoop::enter_shaker_parts(const std::string& by,
     for (const auto& [part, evidence] : parts.proven) {
         what.evidence = evidence;
         book_.prove({part}, what, loaded_);
-        keep_commissioned({name_of(part), "", by, "", "accept",
-                           Json{{"record_sha256", book_.sha256()}, {"evidence", evidence}}.dump()});
+        commissioning_.enter(
+            {name_of(part), "", by, "", "accept",
+             Json{{"record_sha256", book_.sha256()}, {"evidence", evidence}}.dump()});
         names += (names.empty() ? "" : ", ") + std::string(name_of(part));
     }
     auto text = fmt::format("{}{} recorded by {}", configuration_.simulated() ? "SIMULATED: " : "",
@@ -205,8 +206,9 @@ CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json&
         fmt::format("{} signed with the certificate of {}, record {}", names, by, book_.sha256());
     log(Severity::info, "commissioning", text);
     for (const Part part : parts)
-        keep_commissioned({name_of(part), "", request.by, "", "sign",
-                           Json{{"record_sha256", book_.sha256()}, {"cms", what["cms"]}}.dump()});
+        commissioning_.enter(
+            {name_of(part), "", request.by, "", "sign",
+             Json{{"record_sha256", book_.sha256()}, {"cms", what["cms"]}}.dump()});
     return {true, text};
 }
 
@@ -214,11 +216,10 @@ CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
                                                const std::string& second,
                                                const Json& confirmed_bits,
                                                const configuration::Loaded& file) {
-    using Outcome = commission::Finding::Outcome;
     const std::vector<Part> parts{Part::bus, Part::gimbals, Part::accelerometers, Part::earth};
-    if (!procedure_ || procedure_->active() || procedure_->finding().outcome != Outcome::decided)
-        return {false, "nothing is decided: vibrig commission --by NAME"};
-    const auto& finding = procedure_->finding();
+    const auto* const decided = commissioning_.decided();
+    if (decided == nullptr) return {false, "nothing is decided: vibrig commission --by NAME"};
+    const auto& finding = *decided;
     if (!finding.corrections.empty())
         return {false, "the DBC first, then commission anew: " + finding.corrections.front()};
     if (const auto why = commission::not_as_found(finding, file); !why.empty()) return {false, why};
@@ -236,7 +237,7 @@ CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
     evidence["bits"] = commission::with_confirmed(commission::BitBook(file.configuration).bits(),
                                                   confirmed_bits, {request.by, second}, utc_now());
     auto reply = record_parts(request, second, parts, evidence, file);
-    if (reply.accepted) progress().remove();
+    if (reply.accepted) commissioning_.recorded();
     return reply;
 }
 
@@ -256,12 +257,12 @@ CommandReply ControlLoop::record_parts(const CommandRequest& request, const std:
                                   request.by, second, book_.sha256());
     log(Severity::info, "commissioning", text);
     for (const Part part : parts)
-        keep_commissioned({name_of(part), "", request.by, "", "accept",
-                           Json{{"second", second},
-                                {"record_sha256", book_.sha256()},
-                                {"signed_with", book_.signed_with()},
-                                {"evidence", evidence}}
-                               .dump()});
+        commissioning_.enter({name_of(part), "", request.by, "", "accept",
+                              Json{{"second", second},
+                                   {"record_sha256", book_.sha256()},
+                                   {"signed_with", book_.signed_with()},
+                                   {"evidence", evidence}}
+                                  .dump()});
     const auto standing = book_.standing(what.utc_ns);
     const bool read = std::ranges::all_of(
         parts, [&standing](Part part) { return standing[static_cast<std::size_t>(part)].proven; });

@@ -31,10 +31,7 @@ void tell(rt::Ring<RtEvent>& ring, Severity severity, const char* source,
 std::unique_ptr<fleet::Publisher> make_publisher(StatusSource& source, Parts& parts) {
     const auto& mqtt = parts.configuration.mqtt;
     if (mqtt.host.empty()) return nullptr;
-    return std::make_unique<fleet::Publisher>(source, mqtt,
-                                              [&parts](Severity severity, const std::string& text) {
-                                                  parts.events.log(severity, "mqtt", text);
-                                              });
+    return std::make_unique<fleet::Publisher>(source, mqtt, parts.events.sink("mqtt"));
 }
 
 }  // namespace
@@ -128,9 +125,7 @@ void Daemon::open_outbox() {
             configuration.paperwork.unit_serial,
             configuration.campaign.type_prior ? configuration.paperwork.unit_type : "",
             configuration.simulated()},
-        [this](Severity severity, const std::string& text) {
-            parts_.events.log(severity, "archive", text);
-        });
+        parts_.events.sink("archive"));
     parts_.outbox->start();
 }
 

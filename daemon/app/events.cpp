@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <utility>
 
 #include "daemon/serve/one_line.hpp"
 
@@ -41,6 +42,12 @@ void Events::enter(Severity severity, const std::string& source, const std::stri
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;
     spdlog::log(level, "{}: {}", source, record.text);
+}
+
+EventSink Events::sink(std::string source) {
+    return [this, source = std::move(source)](Severity severity, const std::string& text) {
+        log(severity, source, text);
+    };
 }
 
 }  // namespace vibrig

@@ -32,6 +32,8 @@ class Events {
     void log(Severity severity, const std::string& source, const std::string& text);
     /// The same, and no pager is told.
     void enter(Severity severity, const std::string& source, const std::string& text);
+    /// What is reported there is logged as of `source`; for as long as this lives.
+    [[nodiscard]] EventSink sink(std::string source);
     /// To the pager and the horn.
     void announce(drivers::HornPattern pattern, const std::string& text);
     [[nodiscard]] std::vector<EventRecord> after(std::uint64_t id, std::size_t at_most) const {

@@ -85,10 +85,7 @@ std::unique_ptr<record::PreTrip> make_pre_trip(Parts& parts) {
     return std::make_unique<record::PreTrip>(
         (std::filesystem::path(parts.configuration.results) / "trips").string(),
         parts.configuration.assembler.sample_period,
-        [&parts] { return parts.events.after(0, kManyEvents); },
-        [&parts](Severity severity, const std::string& text) {
-            parts.events.log(severity, "pre-trip", text);
-        });
+        [&parts] { return parts.events.after(0, kManyEvents); }, parts.events.sink("pre-trip"));
 }
 
 /// To whom the acquisition hands what it has received.
@@ -141,10 +138,7 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
       control_waiter(std::make_unique<rt::StirredWaiter>(clock.make_waiter())),
       estimator_waiter(clock.make_waiter()),
       interlock(*shaker, *control_waiter, interlock_limits(configuration, dbc)),
-      book(configuration.estimator,
-           [this](Severity severity, const std::string& text) {
-               events.log(severity, "noise", text);
-           }),
+      book(configuration.estimator, events.sink("noise")),
       estimator_stage(estimator_ring, *estimator_waiter, *control_waiter, book.identification()),
       recorder(make_recorder(*this)),
       sent_tap(recorder ? std::make_unique<record::SentTap>(*port, clock, recorder->sent())

@@ -58,7 +58,7 @@ void be_last() {
 }  // namespace
 
 Outbox::Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit,
-               Event event)
+               EventSink event)
     : settings_(std::move(settings)),
       recordings_(std::move(recordings)),
       unit_(std::move(unit)),

@@ -22,7 +22,6 @@ namespace vibrig::archive {
 /// removed before. Any thread may call.
 class Outbox {
   public:
-    using Event = std::function<void(Severity, const std::string&)>;
     /// The unit on the rig.
     struct Unit {
         std::string serial;  ///< empty: not known
@@ -30,7 +29,8 @@ class Outbox {
         bool simulated = false;
     };
     /// `recordings`: the folder of campaigns' folders. `event` is called in its thread.
-    Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit, Event event);
+    Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit,
+           EventSink event);
     ~Outbox();
     Outbox(const Outbox&) = delete;
     Outbox& operator=(const Outbox&) = delete;
@@ -75,7 +75,7 @@ class Outbox {
     const std::string recordings_;
     const Unit unit_;
     const std::string program_;
-    const Event event_;
+    const EventSink event_;
     std::map<std::string, int> failed_;  ///< campaigns that could not be delivered, and how often
     std::string told_;                   ///< why the newest could not
     std::atomic<bool> stop_{false};

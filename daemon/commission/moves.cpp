@@ -102,7 +102,7 @@ void Procedure::move(const Vec3& travel, Then then) {
 
 void Procedure::next_leg() {
     const Vec3 to = legs_.front();
-    before_ = ports_.sample();
+    before_ = rig_->sample();
     moving_slot_ = 3;
     int moved = 0;
     Vec3 command{};
@@ -122,12 +122,16 @@ void Procedure::command_to(const Vec3& command) {
     commanded_ = true;
     released_ = false;
     note("move", {{"command_deg", command}});
-    if (!replaying_) (counting_ ? ports_.slew_counting : ports_.slew)(command, now_);
+    if (replaying_) return;
+    if (counting_)
+        rig_->slew_counting(command, now_);
+    else
+        rig_->slew(command, now_);
 }
 
 void Procedure::release() {
     released_ = true;
-    if (!replaying_) ports_.release(now_);
+    if (!replaying_) rig_->release(now_);
 }
 
 void Procedure::average(double seconds, Then then) {
@@ -166,14 +170,14 @@ std::string Procedure::contradiction(const Look& seen) const {
 }
 
 void Procedure::watch_move(Time now) {
-    const Look seen = ports_.sample();
+    const Look seen = rig_->sample();
     if (!seen.good || now - seen.to > kStale) return stop("a channel is silent or not good", now);
     if (const auto wrong = contradiction(seen); !wrong.empty())
         return conclude(
             Verdict::undecided,
             fmt::format("stopped: {}: look at the rig, then by hand (--by-hand)", wrong),
             keys_of_moving());
-    switch (ports_.gimbal()) {
+    switch (rig_->gimbal()) {
         case drivers::GimbalState::in_position:
             return arrive(now);
         case drivers::GimbalState::timed_out:
@@ -232,7 +236,7 @@ void Procedure::arrive(Time now) {
 }
 
 void Procedure::take_second(Time now) {
-    const Look second = ports_.second();
+    const Look second = rig_->second();
     const bool fresh = seconds_.empty() || second.from > seconds_.back().from;
     if (second.good && second.from >= since_ && fresh) {
         seconds_.push_back(second);
@@ -263,7 +267,7 @@ void Procedure::take_second(Time now) {
 }
 
 Vec3 Procedure::read_travel(const Vec3& near) const {
-    const Look seen = ports_.sample();
+    const Look seen = rig_->sample();
     const Vec3 angle = unwrapped(seen.angle, start_);
     Vec3 travel = near;
     for (std::size_t k = 0; seen.good && k < 3; ++k) {

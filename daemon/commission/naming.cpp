@@ -387,7 +387,7 @@ void Procedure::decide() {
 
 /// For the record.
 std::string Procedure::why_not_torqued() const {
-    if (!ports_.torque) return "the DBC has no torques";
+    if (!rig_->has_torquers()) return "the DBC has no torques";
     if (!by_hand_) return "no torque was permitted";
     // A torque is ended by commanding the gimbals to stand; here nothing stops what it turns.
     return "moved by hand: motors off, nothing holds a platform that a torque turns the wrong way";
@@ -408,12 +408,12 @@ void Procedure::name_rig() {
     }
     if (!finding_.evidence.contains("torquers")) {
         finding_.evidence["torquers"] = {{"not_measured", why_not_torqued()}};
-        if (by_hand_ && ports_.torque)
+        if (by_hand_ && rig_->has_torquers())
             tell("G  not torqued, " + why_not_torqued() +
                  ": levelling.torque_sign stays as stated, unproven");
     }
     fill_keys(finding_, earth_.description, earth_.rate, names_, said_of_rig_, commanded);
-    const auto rate = ports_.rate ? ports_.rate() : SampleRate{};
+    const auto rate = rig_->rate().value_or(SampleRate{});
     if (!rate.why.empty()) return conclude(Verdict::refused, rate.why, {"can.sample_rate_hz"});
     fill_bus_keys(finding_, names_, rate.measured_hz);
     conclude(Verdict::decided, {});

@@ -21,13 +21,13 @@ constexpr Time kPoll = 50 * drivers::kMillisecond;
 
 void Procedure::begin(const std::string& by, bool by_hand, Time now) {
     open(by, by_hand, now);
-    ports_.keep(log_);
+    keeper_->keep(log_);
 }
 
 void Procedure::open(const std::string& by, bool by_hand, Time now) {
     Json script = std::move(script_);
     const Time attended = attended_;
-    *this = Procedure(std::move(names_), stated_, std::move(ports_));
+    *this = Procedure(std::move(names_), stated_, *rig_, *keeper_);
     script_ = std::move(script);
     attended_ = attended;
     by_ = by;
@@ -51,15 +51,15 @@ std::string Procedure::step_name() const {
 }
 
 void Procedure::note(const char* what, const Json& data) const {
-    if (replaying_ || !ports_.note) return;
+    if (replaying_) return;
     const std::string step = step_name();
     const char* part = step == "F" ? "earth" : step == "G" ? "gyros" : "gimbals";
-    ports_.note({part, step, by_, what, data});
+    keeper_->note({part, step, by_, what, data});
 }
 
 void Procedure::tell(const std::string& line) {
     lines_.push_back(line);
-    if (!replaying_) ports_.event(Severity::info, line);
+    if (!replaying_) keeper_->event(line);
 }
 
 void Procedure::ask(Question question, std::function<void(const std::string&)> then) {
@@ -99,7 +99,7 @@ std::string Procedure::answer(const std::string& by, const std::string& id, std:
     if (const auto expected = question_.wrong ? question_.wrong(value) : std::string();
         !expected.empty())
         return fmt::format("found \"{}\", expected {}", given, expected);
-    ports_.event(Severity::info, fmt::format("{} {}, says {}", question_.text, value, by));
+    keeper_->event(fmt::format("{} {}, says {}", question_.text, value, by));
     const bool permission = id == "power" || id == "go_on" || id.starts_with("permit.");
     note(permission ? "permission" : "answer", {{"id", id}, {"value", value}});
     take_answer(value);
@@ -135,9 +135,9 @@ void Procedure::take_said(const std::string& value) {
 void Procedure::stand() {
     if (by_hand_ || !commanded_) return;
     if (torquing_) {
-        if (!replaying_) static_cast<void>(ports_.torque({}));
+        if (!replaying_) rig_->torque({});
         // Held, a platform turns no further whatever its torquers do.
-        if (hold_ && released_ && ports_.sample().good) {
+        if (hold_ && released_ && rig_->sample().good) {
             travel_ = read_travel(travel_);
             return command_to({command_0_[0] + travel_[0], command_0_[1] + travel_[1],
                                command_0_[2] + travel_[2]});
@@ -147,7 +147,7 @@ void Procedure::stand() {
         if (!hold_ && !released_) release();
         return;
     }
-    bool known = hold_ && holds_ && ports_.sample().good;
+    bool known = hold_ && holds_ && rig_->sample().good;
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t c = channel_of_[k];
         if (legs_.front()[k] != travel_[k]) known = known && c < 3 && ratio_[c] != 0;
@@ -229,7 +229,7 @@ Time Procedure::step(Time now, Time wall) {
         then();
     }
     if (doing_ == Doing::averaging) {
-        if (const Look sample = ports_.sample();
+        if (const Look sample = rig_->sample();
             slot_ == 0 && careful_ && sample.good &&
             (samples_.empty() || sample.to > samples_.back().to))
             samples_.push_back(sample);

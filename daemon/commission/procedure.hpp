@@ -8,51 +8,11 @@
 #include <vector>
 
 #include "daemon/commission/finding.hpp"
-#include "daemon/domain/events.hpp"
-#include "drivers/gimbal/gimbal.hpp"
+#include "daemon/commission/rig.hpp"
 #include "estimator/commissioning/torques.hpp"
 #include "estimator/commissioning/turns.hpp"
 
 namespace vibrig::commission {
-
-/// The newest sample, or the mean of a second, as the bus says: angles in deg, g.
-struct Look {
-    drivers::Time from = 0, to = 0;
-    Vec3 angle{}, force{};
-    bool good = false;
-};
-
-/// For the journal: what was done, asked or found at which step.
-struct Note {
-    std::string part, step, by;
-    std::string what;  ///< begin, permission, move, reading, hypothesis, question, answer, verdict
-    Json data = Json::object();
-};
-
-/// Samples a second: counted against the kernel's stamps, and as configured.
-struct SampleRate {
-    double measured_hz = 0, configured_hz = 0;
-    std::string why{};  ///< they do not fit, or it is not measured; empty: they do
-};
-
-/// What it acts on. Control thread.
-struct Ports {
-    std::function<Look()> sample, second;
-    std::function<void(const Vec3& command_deg, drivers::Time now)> slew;
-    std::function<void(drivers::Time now)> release;
-    std::function<drivers::GimbalState()> gimbal;
-    /// By the commands' names, as they are sent: without levelling.torque_sign. Empty: no torquers.
-    std::function<bool(const Vec3& deg_per_h)> torque;
-    std::function<void(Severity, const std::string&)> event;
-    /// What was answered and measured so far, on disk when this returns: begin_again() takes it.
-    std::function<void(const Json& log)> keep;
-    std::function<void(const Note& note)> note;
-    std::function<SampleRate()> rate;  ///< empty: nobody measures it
-    /// As `slew`, and the gyros count meanwhile; empty: no increments are on the bus.
-    std::function<void(const Vec3& command_deg, drivers::Time now)> slew_counting;
-    std::function<void()> count;        ///< from now on
-    std::function<Vec3()> counted_deg;  ///< since; and no longer
-};
 
 /// What an earlier daemon kept of a procedure.
 struct Kept {
@@ -75,8 +35,9 @@ struct Question {
 /// never waits.
 class Procedure {
   public:
-    Procedure(Names names, Stated stated, Ports ports)
-        : names_(std::move(names)), stated_(stated), ports_(std::move(ports)) {}
+    /// `rig` and `keeper` outlive it.
+    Procedure(Names names, Stated stated, Rig& rig, Keeper& keeper)
+        : names_(std::move(names)), stated_(stated), rig_(&rig), keeper_(&keeper) {}
 
     /// `by_hand`: a person moves the gimbals, and nothing is commanded.
     void begin(const std::string& by, bool by_hand, drivers::Time now);
@@ -230,7 +191,8 @@ class Procedure {
 
     Names names_;
     Stated stated_;
-    Ports ports_;
+    Rig* rig_;
+    Keeper* keeper_;
     std::string by_;
     bool by_hand_ = false;
     drivers::Time now_ = 0, attended_ = 0;

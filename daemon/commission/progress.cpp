@@ -75,7 +75,7 @@ Kept Progress::read(const std::string& by, bool by_hand, std::int64_t utc_ns) co
 
 void Procedure::keep(Json entry) {
     log_.push_back(std::move(entry));
-    if (!replaying_) ports_.keep(log_);
+    if (!replaying_) keeper_->keep(log_);
 }
 
 void Procedure::take_answer(const std::string& value) {
@@ -96,7 +96,7 @@ void Procedure::keep_mean() {
                {"noise", noise_}};
     for (const Look& one : seconds_)  // a drift is more than its mean
         if (released_ || by_hand_) entry["seconds"].push_back(Json{one.from, one.angle});
-    if (counting_ && !replaying_) counted_deg_ = ports_.counted_deg();
+    if (counting_ && !replaying_) counted_deg_ = rig_->counted();
     if (counting_) entry["counted_deg"] = counted_deg_;
     keep(std::move(entry));
 }

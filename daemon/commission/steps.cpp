@@ -120,13 +120,14 @@ void Procedure::looked() {
 /// "40.0 samples/s, 6 channels, "; it ends where that is not what is configured.
 std::string Procedure::rate_text() {
     // What was kept was looked at by the daemon that kept it.
-    if (!ports_.rate || replaying_) return {};
-    const auto rate = ports_.rate();
-    if (!rate.why.empty()) {
-        conclude(Verdict::refused, rate.why, {"can.sample_rate_hz", "can.signals.sync_count"});
+    if (replaying_) return {};
+    const auto rate = rig_->rate();
+    if (!rate) return {};
+    if (!rate->why.empty()) {
+        conclude(Verdict::refused, rate->why, {"can.sample_rate_hz", "can.signals.sync_count"});
         return {};
     }
-    return fmt::format("{:.1f} samples/s, 6 channels, ", rate.measured_hz);
+    return fmt::format("{:.1f} samples/s, 6 channels, ", rate->measured_hz);
 }
 
 /// Through 50 samples at rest, where others of its kind show their noise.

@@ -33,7 +33,7 @@ std::string axes_of(const room::TorqueFinding& f) {
 }  // namespace
 
 void Procedure::ask_torques() {
-    if (by_hand_ || !ports_.torque) return ask_turns();
+    if (by_hand_ || !rig_->has_torquers()) return ask_turns();
     torque_deg_h_ = std::min(kTorque_deg_h, stated_.torque_limit_deg_h);
     const auto yes_or_no = [](std::string& value) {
         if (value == "y") value = "yes";
@@ -101,16 +101,16 @@ void Procedure::next_torque() {
 void Procedure::torque(const Vec3& deg_per_h) {
     if (deg_per_h != torque_) note("torque", {{"deg_per_h", deg_per_h}});
     torque_ = deg_per_h;
-    torque_from_ = ports_.sample();
-    if (!replaying_) static_cast<void>(ports_.torque(torque_));
+    torque_from_ = rig_->sample();
+    if (!replaying_) rig_->torque(torque_);
 }
 
 /// A torquer that turns the platform too far, or a channel that is silent, ends it.
 void Procedure::watch_torque(drivers::Time now) {
     if (!torquing_) return;
-    static_cast<void>(ports_.torque(torque_));
+    rig_->torque(torque_);
     if (torque_ == Vec3{} || doing_ != Doing::averaging) return;
-    const Look seen = ports_.sample();
+    const Look seen = rig_->sample();
     if (!seen.good || now - seen.to > drivers::kSecond / 2)
         return stop("a channel is silent or not good", now);
     const Vec3 angle = unwrapped(seen.angle, torque_from_.angle);

@@ -20,7 +20,7 @@ constexpr std::array<const char*, 3> kAxisNames{"x", "y", "z"};
 }  // namespace
 
 void Procedure::ask_turns() {
-    if (by_hand_ || !ports_.slew_counting) return name_rig();
+    if (by_hand_ || !rig_->has_increments()) return name_rig();
     const auto yes_or_no = [](std::string& value) {
         if (value == "y") value = "yes";
         if (value == "n") value = "no";
@@ -51,7 +51,7 @@ void Procedure::next_turn() {
             Vec3 to{};
             const auto& [least, most] = limits_deg_[slot];
             to[slot] = most >= -least ? std::min(kTurn_deg, most) : -std::min(kTurn_deg, -least);
-            if (!replaying_) ports_.count();
+            if (!replaying_) rig_->count();
             counting_ = true;
             move(to, [this] {
                 average(1, [this] {

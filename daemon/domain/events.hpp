@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "drivers/base/clock.hpp"
@@ -18,5 +19,8 @@ struct EventRecord {
     std::string source;  ///< "campaign", "can", "shaker", ...
     std::string text;
 };
+
+/// Where a part reports an event of its own; whoever hands it out knows the source's name.
+using EventSink = std::function<void(Severity, const std::string& text)>;
 
 }  // namespace vibrig

@@ -8,7 +8,7 @@
 
 namespace vibrig::dwells {
 
-DwellBook::DwellBook(const estimator::Settings& settings, noise::NoiseMonitor::Event event,
+DwellBook::DwellBook(const estimator::Settings& settings, EventSink event,
                      Noise noise)
     : settings_(settings),
       decides_(noise),

@@ -28,7 +28,7 @@ class DwellBook {
     };
     /// Without an `event` nobody hears of the noise (noise::NoiseMonitor). Throws SettingsError.
     explicit DwellBook(const estimator::Settings& settings,
-                       noise::NoiseMonitor::Event event = nullptr, Noise noise = Noise::decided);
+                       EventSink event = nullptr, Noise noise = Noise::decided);
 
     /// A new campaign, of about so many dwells: everything is forgotten.
     void begin(std::size_t dwells);

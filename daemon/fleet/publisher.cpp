@@ -57,7 +57,7 @@ struct Publisher::Impl {
         std::string trouble;  ///< what the broker or the library said last
     };
 
-    Impl(const StatusSource& from, const configuration::MqttSettings& given, Log to)
+    Impl(const StatusSource& from, const configuration::MqttSettings& given, EventSink to)
         : source(from), settings(given), log(std::move(to)) {
         readable("ca", settings.ca);
         readable("certificate", settings.certificate);
@@ -265,7 +265,7 @@ struct Publisher::Impl {
 
     const StatusSource& source;
     const configuration::MqttSettings settings;
-    const Log log;
+    const EventSink log;
     std::string password;
     EdgeNode node;  ///< the publisher's thread
     mutable std::mutex mutex;
@@ -276,7 +276,7 @@ struct Publisher::Impl {
 };
 
 Publisher::Publisher(const StatusSource& source, const configuration::MqttSettings& settings,
-                     Log log)
+                     EventSink log)
     : impl_(std::make_shared<Impl>(source, settings, std::move(log))) {}
 
 Publisher::~Publisher() { impl_->end(); }

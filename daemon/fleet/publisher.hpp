@@ -1,10 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "daemon/configuration/mqtt_settings.hpp"
+#include "daemon/domain/events.hpp"
 #include "daemon/status/source.hpp"
 
 namespace vibrig::fleet {
@@ -14,11 +14,10 @@ namespace vibrig::fleet {
 /// seldom up to the settings' backoff; what a slow one does not take is left out.
 class Publisher {
   public:
-    using Log = std::function<void(Severity, const std::string&)>;
-
     /// Throws std::runtime_error that names the key for a file that cannot be read. `log` is called
     /// from the publisher's thread.
-    Publisher(const StatusSource& source, const configuration::MqttSettings& settings, Log log);
+    Publisher(const StatusSource& source, const configuration::MqttSettings& settings,
+              EventSink log);
     ~Publisher();
     void start();
     void stop();  ///< tells the broker the node's death and ends the thread, within two seconds

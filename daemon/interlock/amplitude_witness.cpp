@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 
 namespace vibrig::rt {
 
@@ -89,10 +87,7 @@ double Ramp::at(Time time, Time from) const noexcept {
 }
 
 AmplitudeWitness::AmplitudeWitness(const Settings& settings) : settings_(settings) {
-    if (settings.sample_period <= 0)
-        throw std::invalid_argument("amplitude witness: sample period: found " +
-                                    std::to_string(settings.sample_period) +
-                                    " ns, expected above 0");
+    static_cast<void>(drivers::checked_period("amplitude witness", settings.sample_period));
     set_windows();
 }
 

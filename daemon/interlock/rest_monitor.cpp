@@ -29,7 +29,7 @@ void take_back(RestWitness& witness, const Doubt& doubt) noexcept {
 
 RestWindow::RestWindow(Time window, Time sample_period)
     : window_(std::max(window, kFewest * sample_period)),
-      sample_period_(sample_period),
+      sample_period_(drivers::checked_period("rest", sample_period)),
       ring_(static_cast<std::size_t>(window_ / sample_period) + 2) {}
 
 void RestWindow::add(Time time, double value) noexcept {

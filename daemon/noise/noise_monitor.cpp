@@ -43,7 +43,7 @@ double limited(double wanted, double present) {
 
 }  // namespace
 
-NoiseMonitor::NoiseMonitor(const estimator::Settings& settings, Event event)
+NoiseMonitor::NoiseMonitor(const estimator::Settings& settings, EventSink event)
     : settings_(settings), event_(std::move(event)) {
     const auto sigma = estimator::prior_sigma(settings);
     prior_.covariance.assign(estimator::kParameters * estimator::kParameters, 0);
@@ -300,7 +300,7 @@ void NoiseMonitor::conclude(estimator::DwellSummary& dwell,
 }
 
 void NoiseMonitor::continue_from(NoiseMonitor&& other) {
-    Event own = std::move(event_);
+    EventSink own = std::move(event_);
     *this = std::move(other);
     event_ = std::move(own);
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,7 +29,6 @@ struct Found {
 /// learns from it, and says what the filter should use from the next dwell on. Control thread only.
 class NoiseMonitor {
   public:
-    using Event = std::function<void(Severity, const std::string&)>;
     /// Of the coefficients, order of parameter_names(); the covariance 30 x 30, row-major.
     struct Knowledge {
         std::array<double, estimator::kParameters> coefficients{};
@@ -38,7 +36,7 @@ class NoiseMonitor {
     };
     /// Without an `event` nobody hears or looks: of the terms only Q and N are found, what they are
     /// taken for is the same.
-    NoiseMonitor(const estimator::Settings& settings, Event event);
+    NoiseMonitor(const estimator::Settings& settings, EventSink event);
 
     /// A new campaign: everything is forgotten, the settings' noise is in force.
     void reset();
@@ -88,7 +86,7 @@ class NoiseMonitor {
     void tell(const Words& words) const;
 
     estimator::Settings settings_;
-    Event event_;
+    EventSink event_;
     std::vector<rt::BlockRecord> blocks_;
     std::vector<estimator::allan::DwellMonitor> gyros_;
     std::shared_ptr<const estimator::allan::DwellBasis> basis_;

@@ -61,11 +61,12 @@ void rename_durably(const std::filesystem::path& from, const std::filesystem::pa
 
 }  // namespace
 
-PreTrip::PreTrip(std::string folder, Time sample_period, Events events, Tell tell)
+PreTrip::PreTrip(std::string folder, Time sample_period, Events events, EventSink tell)
     : folder_(std::move(folder)),
       events_(std::move(events)),
       tell_(std::move(tell)),
-      kept_(static_cast<std::size_t>(kSpan / sample_period) + 1) {}
+      kept_(static_cast<std::size_t>(kSpan / drivers::checked_period("pre-trip", sample_period)) +
+            1) {}
 
 PreTrip::~PreTrip() { stop(); }
 

@@ -28,10 +28,9 @@ class PreTrip {
         std::int64_t utc_ns = 0;
     };
     using Events = std::function<std::vector<EventRecord>()>;  ///< the newest, oldest first
-    using Tell = std::function<void(Severity, const std::string&)>;
 
     /// Files go to `folder`, which is made when the first one does.
-    PreTrip(std::string folder, drivers::Time sample_period, Events events, Tell tell);
+    PreTrip(std::string folder, drivers::Time sample_period, Events events, EventSink tell);
     ~PreTrip();
 
     /// The acquisition thread pushes what its interlock has judged.
@@ -50,7 +49,7 @@ class PreTrip {
 
     const std::string folder_;
     Events events_;
-    Tell tell_;
+    EventSink tell_;
     rt::Ring<drivers::Sample> ring_{8192};
     std::vector<drivers::Sample> kept_;  ///< circular
     std::size_t next_ = 0, filled_ = 0;

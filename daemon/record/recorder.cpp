@@ -57,7 +57,7 @@ bool SentTap::send(const canfd_frame& frame, bool fd) noexcept {
 }
 
 Recorder::Recorder(const configuration::RecordSettings& settings, std::string folder,
-                   const drivers::Clock& clock, drivers::Waiter& self, Event on_event)
+                   const drivers::Clock& clock, drivers::Waiter& self, EventSink on_event)
     : settings_(settings),
       folder_(std::move(folder)),
       clock_(clock),

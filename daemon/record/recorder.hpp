@@ -48,13 +48,12 @@ class SentTap final : public drivers::CanPort {
 /// again, told in the recording.
 class Recorder {
   public:
-    using Event = std::function<void(Severity, const std::string&)>;
     using Estimates = std::function<estimator::Estimate()>;
     using Conditions = std::function<ConditionRow()>;
 
     /// `folder`: where campaigns' folders go. `on_event` is called in the recorder's thread.
     Recorder(const configuration::RecordSettings& settings, std::string folder,
-             const drivers::Clock& clock, drivers::Waiter& self, Event on_event);
+             const drivers::Clock& clock, drivers::Waiter& self, EventSink on_event);
     ~Recorder();
 
     /// Acquisition pushes what it received, ...
@@ -133,7 +132,7 @@ class Recorder {
     const std::string folder_;
     const drivers::Clock& clock_;
     drivers::Waiter& self_;
-    Event on_event_;
+    EventSink on_event_;
     Estimates estimates_;
     Conditions conditions_;
     std::function<std::string()> journal_head_;

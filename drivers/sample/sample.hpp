@@ -85,6 +85,9 @@ struct SignalBindings {
 /// Temperatures beside the inner element's, in the order of PlatformStatus::sensor_c.
 inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x", "gyro y",
                                                                 "gyro z"};
+/// `period`. Throws std::invalid_argument that says whose it is where it is not above 0 ns.
+[[nodiscard]] Time checked_period(const char* of, Time period);
+
 /// What the platform says of itself; slower than samples. Latest value wins.
 struct PlatformStatus {
     Time time = 0;             ///< of the newest status frame; 0: none yet

@@ -26,7 +26,7 @@ class Commissioned : public ::testing::Test {
     void rig_of(std::uint64_t seed) {
         rig = std::make_unique<UnknownRig>(seed);
         // A reading near its zero may wrap within a second's mean, here as on a rig.
-        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
+        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, wired, wired);
     }
 
     static Names names() {
@@ -36,45 +36,51 @@ class Commissioned : public ::testing::Test {
         return n;
     }
 
-    Ports ports() {
-        Ports p;
-        p.sample = [this] { return seen(now - kSecond / 40, 5 / 3600.0); };
-        p.second = [this] { return seen(now / kSecond * kSecond - kSecond, 1 / 3600.0); };
-        p.slew = [this](const Vec3& command, Time) { slew(command); };
-        p.release = [this](Time) {
-            ++released;
-            drift = rig->drift(turned_by(torque));
-            drifting_since = now;
-            if (ends_ahead_deg) {
-                ends = drift.reading;
-                for (std::size_t i = 0; i < 3; ++i)
-                    (*ends)[static_cast<std::size_t>(rig->channel[i])] +=
-                        *ends_ahead_deg / rig->degrees[i];
-            }
-        };
-        p.gimbal = [this] {
-            return now >= arrives ? drivers::GimbalState::in_position
-                                  : drivers::GimbalState::slewing;
-        };
-        if (torquers)
-            p.torque = [this](const Vec3& command) {
-                if (command != torque) torque_to(command);
-                ++torques;
-                return true;
-            };
-        if (sample_rate) p.rate = [this] { return *sample_rate; };
-        if (counts) {
-            p.slew_counting = [this](const Vec3& command, Time) {
-                ++counting_slews;
-                slew(command);
-            };
-            p.count = [this] { counted_from = rig->angle_deg(); };
-            p.counted_deg = [this] { return counted(); };
+    /// The fixture, as the procedure acts on it.
+    class Wired final : public Rig, public Keeper {
+      public:
+        explicit Wired(Commissioned& of) : of_(of) {}
+
+        Look sample() override { return of_.seen(of_.now - kSecond / 40, 5 / 3600.0); }
+        Look second() override {
+            return of_.seen(of_.now / kSecond * kSecond - kSecond, 1 / 3600.0);
         }
-        p.keep = [this](const Json& log) { kept = log; };
-        p.note = [this](const Note& note) { notes.push_back(note); };
-        p.event = [this](Severity, const std::string& text) { events.push_back(text); };
-        return p;
+        std::optional<SampleRate> rate() override { return of_.sample_rate; }
+        drivers::GimbalState gimbal() override {
+            return of_.now >= of_.arrives ? drivers::GimbalState::in_position
+                                          : drivers::GimbalState::slewing;
+        }
+        void slew(const Vec3& command, Time) override { of_.slew(command); }
+        void release(Time) override { of_.let_go(); }
+        bool has_torquers() const override { return of_.torquers.has_value(); }
+        void torque(const Vec3& command) override {
+            if (command != of_.torque) of_.torque_to(command);
+            ++of_.torques;
+        }
+        bool has_increments() const override { return of_.counts.has_value(); }
+        void count() override { of_.counted_from = of_.rig->angle_deg(); }
+        Vec3 counted() override { return of_.counted(); }
+        void slew_counting(const Vec3& command, Time) override {
+            ++of_.counting_slews;
+            of_.slew(command);
+        }
+
+        void event(const std::string& text) override { of_.events.push_back(text); }
+        void note(const Note& note) override { of_.notes.push_back(note); }
+        void keep(const Json& log) override { of_.kept = log; }
+
+      private:
+        Commissioned& of_;
+    };
+
+    void let_go() {
+        ++released;
+        drift = rig->drift(turned_by(torque));
+        drifting_since = now;
+        if (!ends_ahead_deg) return;
+        ends = drift.reading;
+        for (std::size_t i = 0; i < 3; ++i)
+            (*ends)[static_cast<std::size_t>(rig->channel[i])] += *ends_ahead_deg / rig->degrees[i];
     }
 
     /// What gyros along the platform's true axes have counted, of a turn below 90 deg.
@@ -242,6 +248,7 @@ class Commissioned : public ::testing::Test {
         return state["question"].is_null() ? "" : state["question"]["id"].get<std::string>();
     }
 
+    Wired wired{*this};
     std::unique_ptr<UnknownRig> rig;
     std::optional<std::array<int, 3>> counts;  ///< the gyros' signs; none: no increments
     plant::Vec3 counted_from{};

@@ -103,7 +103,7 @@ TEST_F(Moved, AChannelThatFallsSilentStopsAMove) {
 TEST_F(Moved, ARealRigIsMovedByCommandWhereAPersonSaysThatItCountsInDegrees) {
     for (const char* said : {"no", "yes"}) {
         rig_of(1);
-        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, false}, ports());
+        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, false}, wired, wired);
         procedure->begin("Ada", false, now);
         pass(1);
         EXPECT_EQ(procedure->answer("Ada", "power", "yes"), "");

@@ -33,7 +33,7 @@ class Resumed : public Commissioned {
 
     /// Another daemon; the rig stands where it was, and drifts on if it was let go.
     void die() {
-        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
+        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, wired, wired);
         now += 60 * kSecond;
         arrives = now;
     }

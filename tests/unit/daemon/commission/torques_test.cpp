@@ -237,7 +237,7 @@ TEST_F(Torqued, AfterTheDaemonsEndNothingIsTorquedBeforeANewPermission) {
     to_the_first_torque();
     const Json log = kept;
     // Another daemon; the platform is still torqued, as the last frame said.
-    procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
+    procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, wired, wired);
     const Vec3 left = torque;
     const int before = torques;
     procedure->attend("Ada", now);

@@ -57,6 +57,11 @@ TEST_F(RestMonitorTest, NobodyCallsItRestBeforeAWindowOfSamples) {
     EXPECT_TRUE(run(0.2).measured());
 }
 
+TEST_F(RestMonitorTest, ARateThatNobodyHasStatedIsRefused) {
+    EXPECT_THROW(RestMonitor({}, 0, {}), std::invalid_argument);
+    EXPECT_THROW(RestMonitor({}, -kPeriod, {}), std::invalid_argument);
+}
+
 TEST_F(RestMonitorTest, MeasuresTheRmsOfTheVibration) {
     // GIVEN 5 g at the table and two thirds of it on the platform
     table_g = 5;

@@ -89,6 +89,10 @@ TEST_F(PreTripTest, SavesTheLastMinuteOfSamplesAndEvents) {
     EXPECT_EQ(told[0].first, Severity::info);
 }
 
+TEST_F(PreTripTest, ARateThatNobodyHasStatedIsRefused) {
+    EXPECT_THROW(PreTrip(folder.string(), 0, nullptr, nullptr), std::invalid_argument);
+}
+
 TEST_F(PreTripTest, SaysSoWhenItCannotBeSavedAndLeavesNothingHalf) {
     // GIVEN a file where the folder should be
     std::ofstream(folder.string()) << "x";
