@@ -44,7 +44,7 @@ struct GuardWord {
     bool sees = false;            ///< a witness is known
     bool rest = false;            ///< all witnesses are at rest
     bool reaches_shaker = false;  ///< its own Modbus connection answers
-    bool horn_confirms = true;    ///< false: horn or lamp do not read back as told
+    bool horn_confirms = true;    ///< false: horn or lamp do not read back as commanded
     double table_g = 0;           ///< largest peak at the table that a witness shows
     bool operator==(const GuardWord&) const = default;
 };

@@ -51,7 +51,7 @@ struct RandomRegisters {
     /// armed; the high byte: why it aborted.
     Register control_state{9, RegisterType::u16, WordOrder::big, RegisterTable::input, Access::read,
                            1};
-    std::optional<PsdBlock> psd_block{};  ///< none: it is not told
+    std::optional<PsdBlock> psd_block{};  ///< none: it is not reported
 };
 
 /// Of a controller that goes from one frequency to another by itself, exponentially, and stays

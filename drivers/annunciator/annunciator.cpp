@@ -12,10 +12,10 @@ namespace vibrig::drivers {
 namespace {
 
 constexpr std::size_t kMostWaiting = 16;
-// Two looks in a row: between write and read-back another master may have had its turn.
-constexpr int kLooksToBelieve = 2;
+// Two read-backs in a row: between write and read-back another master may have had its turn.
+constexpr int kReadsToBelieve = 2;
 constexpr auto kLookAtRuns = std::chrono::milliseconds(50);
-constexpr auto kLookAtCommand = std::chrono::seconds(2);
+constexpr auto kCommandPeriod = std::chrono::seconds(2);
 
 [[nodiscard]] Time steady_now() noexcept {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -116,8 +116,8 @@ void Annunciator::sound(Time now) {
         shown_ = pattern_;
     }
     const bool good = horn_->show(shown_, now);
-    bad_looks_ = good ? 0 : std::min(bad_looks_ + 1, kLooksToBelieve);
-    const bool confirms = bad_looks_ < kLooksToBelieve;
+    bad_reads_ = good ? 0 : std::min(bad_reads_ + 1, kReadsToBelieve);
+    const bool confirms = bad_reads_ < kReadsToBelieve;
     bool changed = false;
     {
         const std::lock_guard lock(mutex_);
@@ -131,9 +131,9 @@ void Annunciator::sound(Time now) {
 }
 
 /// Whether it is there has to be known before it is needed.
-void Annunciator::look_at_command(Time now) {
-    if (now < look_due_) return;
-    look_due_ = now + std::chrono::nanoseconds(kLookAtCommand).count();
+void Annunciator::check_command(Time now) {
+    if (now < check_due_) return;
+    check_due_ = now + std::chrono::nanoseconds(kCommandPeriod).count();
     const std::string trouble = command_->trouble();
     if (trouble == trouble_) return;
     trouble_ = trouble;
@@ -145,7 +145,7 @@ void Annunciator::look_at_command(Time now) {
 }
 
 void Annunciator::page(Time now) {
-    look_at_command(now);
+    check_command(now);
     const std::uint64_t done = command_->counters().done;
     std::string wrong = command_->attend(now);
     while (command_->has_room()) {
@@ -186,7 +186,7 @@ void Annunciator::run() {
         if (command_ && !command_->idle()) {
             changed_.wait_for(lock, kLookAtRuns, woken);
         } else if (!horn_) {
-            changed_.wait_for(lock, kLookAtCommand, woken);
+            changed_.wait_for(lock, kCommandPeriod, woken);
         } else {
             changed_.wait_for(
                 lock,

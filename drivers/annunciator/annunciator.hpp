@@ -18,12 +18,12 @@ struct AnnunciatorSettings {
     HornSettings horn;
     std::string command;  ///< program that pages somebody; empty: none
     Time command_limit = 10 * kSecond;
-    std::string source = "vibrigd";  ///< who speaks, in what the command is told
+    std::string source = "vibrigd";  ///< who speaks, in the command's input
 };
 
 struct AnnunciatorStatus {
     bool horn = false;      ///< there is one
-    bool confirms = true;   ///< it reads back as told
+    bool confirms = true;   ///< it reads back as commanded
     std::string horn_note;  ///< why not
     HornPattern pattern = HornPattern::none;
     bool command = false;                                  ///< there is one
@@ -54,7 +54,7 @@ class Annunciator {
     void run();
     void sound(Time now);
     void page(Time now);
-    void look_at_command(Time now);
+    void check_command(Time now);
     [[nodiscard]] std::string to_json(HornPattern kind, const std::string& text) const;
 
     const AnnunciatorSettings settings_;
@@ -62,9 +62,9 @@ class Annunciator {
     std::unique_ptr<Horn> horn_;
     std::unique_ptr<PageCommand> command_;
     HornPattern shown_ = HornPattern::none;
-    int bad_looks_ = 0;
+    int bad_reads_ = 0;
     std::string trouble_;  ///< of the command, as last looked at
-    Time look_due_ = 0;
+    Time check_due_ = 0;
 
     mutable std::mutex mutex_;  ///< guards what follows; never held while horn or command are busy
     std::condition_variable changed_;

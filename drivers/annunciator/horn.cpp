@@ -83,7 +83,7 @@ bool Horn::set(Coil& coil, bool on) {
     coil.on = on;
     if (is_on || !on) return true;
     note_ = link_.name() + ": the " + coil.name + " (coil " + std::to_string(coil.address) +
-            ") was told on and reads back off";
+            ") was switched on and reads back off";
     return false;
 }
 

@@ -45,7 +45,7 @@ class Horn {
     struct Coil {
         const char* name;
         int address;
-        bool on = false;  ///< as last told
+        bool on = false;  ///< as last commanded
     };
     [[nodiscard]] bool reach(Time now);
     [[nodiscard]] bool set(Coil& coil, bool on);

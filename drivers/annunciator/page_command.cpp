@@ -31,7 +31,7 @@ namespace {
         errno = EPIPE;
         return -1;
     }
-    // Whoever reads shall wait for nothing and yet not be told to come again.
+    // A reader must neither block nor get EAGAIN.
     ::fcntl(ends[0], F_SETFL, 0);
     return ends[0];
 }

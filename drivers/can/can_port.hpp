@@ -31,7 +31,7 @@ struct ReceivedFrame {
     bool own = false;  ///< this process sent it (loop-back of an own frame)
 };
 
-/// What the CAN controller says of itself in error frames; a virtual one never does.
+/// What the CAN controller reports of itself in error frames; a virtual one never does.
 enum class ControllerState : std::uint8_t { active, warning, passive, bus_off };
 [[nodiscard]] const char* name_of(ControllerState state) noexcept;
 

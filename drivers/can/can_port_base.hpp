@@ -92,7 +92,7 @@ class CanPortBase : public CanPort {
     /// unconnected one that refuses.
     int send_fd_ = -1;
     int refusing_fd_ = -1;
-    bool announced_ = false;       ///< the present state has been told
+    bool announced_ = false;       ///< the present state has been reported
     bool stopped_ = true;          ///< possibly by a handler
     std::uint32_t overflows_ = 0;  ///< of this socket so far
     Time last_time_ = 0;

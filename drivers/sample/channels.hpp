@@ -64,7 +64,7 @@ static_assert([] {
     return true;
 }());
 
-/// What the platform and the gimbals say of themselves: key can.signals.NAME.
+/// What the platform and the gimbals report of themselves: key can.signals.NAME.
 struct StatusRow {
     const char* name;
     std::string SignalBindings::*signal;

@@ -22,7 +22,7 @@ std::uint64_t MessagePlan::bits(std::span<const std::uint8_t> payload) const noe
 FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
                      std::uint32_t samples_per_frame)
     : dbc_(dbc) {
-    // Another lab's DBC names most things otherwise: all that is missing is told at once.
+    // Another lab's DBC names most things otherwise: all that is missing is listed at once.
     std::vector<BindingError> missing;
     const auto bind = [this, &missing](const char* key, const std::string& name) -> BoundSignal {
         try {

@@ -20,7 +20,7 @@ enum class Quality : std::uint8_t {
     good,
     missing,       ///< the frame with this sync count never came
     stale,         ///< no value for longer than the channel's deadline
-    flagged,       ///< the device said invalid
+    flagged,       ///< the device reported invalid
     out_of_range,  ///< outside the DBC's range, or not finite
     unbound,       ///< no signal is bound to this channel
 };
@@ -88,7 +88,7 @@ inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x"
 /// `period`. Throws std::invalid_argument that says whose it is where it is not above 0 ns.
 [[nodiscard]] Time checked_period(const char* of, Time period);
 
-/// What the platform says of itself; slower than samples. Latest value wins.
+/// What the platform reports of itself; slower than samples. Latest value wins.
 struct PlatformStatus {
     Time time = 0;             ///< of the newest status frame; 0: none yet
     bool ready = false;        ///< the platform's own ready flag

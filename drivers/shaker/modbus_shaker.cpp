@@ -11,10 +11,10 @@ namespace {
 
 // The first time on a new link that is the stop's alone. A device that was cut off for long has
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
-// left shaking is to see it told one thing. 100 ms, and as much again for the way there.
+// left shaking is to see one command go out. 100 ms, and as much again for the way there.
 constexpr Time kStopAlone = 200 * kMillisecond;
-// Between two looks at the watchdog's timeout; a second at most, with the request itself.
-constexpr Time kTimeoutLook = 500 * kMillisecond;
+// Between two reads of the watchdog's timeout; a second at most, with the request itself.
+constexpr Time kTimeoutPeriod = 500 * kMillisecond;
 
 /// A period after `due` if this round was in time; one that came early, or so late that a period
 /// was missed, starts anew.
@@ -181,14 +181,14 @@ void ModbusShaker::work(Time now) {
     }
     if (stop && (!stop_tried_ || now >= next_stop_)) return write_stop(now);
     if (watchdog_due(now)) return serve_watchdog(now);
-    if (now >= next_look_ && !timeout_due_) return look_at_timeout(now);
+    if (now >= next_check_ && !timeout_due_) return check_timeout(now);
     // Before the poll, which a slow line may have due all the time; it ends with one of its own.
     if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
     if (now >= next_poll_) return poll(now);
     if (!stop && identity_due()) return ask_identity();
     if (!stop && psd_due()) return read_psd_part();
     Time next = std::min(next_poll_, stop ? next_stop_ : next_feed_);
-    if (!timeout_due_) next = std::min(next, next_look_);
+    if (!timeout_due_) next = std::min(next, next_check_);
     sleep_until(next);
 }
 
@@ -217,7 +217,7 @@ void ModbusShaker::try_connect(Time now) {
     // A lost reply must not cost the device a feed that it still waits for.
     const bool starved = again && now - last_feed_ > watchdog_timeout();
     stop_alone_until_ = stop_pending() || starved ? now + kStopAlone : now;
-    next_stop_ = next_poll_ = next_look_ = now;
+    next_stop_ = next_poll_ = next_check_ = now;
     next_feed_ = stop_alone_until_;
 }
 
@@ -308,7 +308,7 @@ ModbusShaker::Written ModbusShaker::verify(const char* role, const proto::Regist
     const Reply reply = read(reg, raw);
     if (!reply.ok() && reply.kind != ReplyKind::exception) return Written::not_written;
     if (reply.ok()) std::copy(raw.begin(), raw.end(), image_.words_of(reg).begin());
-    if (reply.ok() && same_raw(reg, words, raw)) return Written::as_told;
+    if (reply.ok() && same_raw(reg, words, raw)) return Written::as_written;
     write_failed_ = true;
     if (reply.ok()) {
         ++counts_.read_back_mismatches;
@@ -361,10 +361,10 @@ Reply ModbusShaker::try_ramp(std::span<const std::uint16_t> ramp) {
 
 void ModbusShaker::write_stop(Time now) {
     stop_tried_ = true;
-    told_.reset();
+    commanded_.reset();
     next_stop_ = now + settings_.backoff_min;
     // A stop at rest may make the device forget the fault that it holds. What a process finds at
-    // its first connection is looked at before; one look, whatever comes of it.
+    // its first connection is read before; once, whatever comes of it.
     if (!std::exchange(looked_, true)) {
         poll(now);
         if (!link_.connected()) return;
@@ -384,14 +384,14 @@ void ModbusShaker::write_stop(Time now) {
         if (on_stop_written_) on_stop_written_();
     }
     const bool done =
-        reply.ok() && link_.connected() && verify("run", run, raw) == Written::as_told;
+        reply.ok() && link_.connected() && verify("run", run, raw) == Written::as_written;
     // What one request for both did not do waits for no turn.
     if (!done && joint_in_vain_ && !alone) next_stop_ = next_attempt_ = clock_.now();
     if (!done) return;
     orders_.stop_done();
     drop_void_set_point();
     write_failed_ = false;
-    // Whoever changed the watchdog's timeout: after a stop it is what we say.
+    // Whoever changed the watchdog's timeout: after a stop it is what we set.
     timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
     next_poll_ = clock_.now();
     next_feed_ = std::max(next_poll_, stop_alone_until_);
@@ -405,12 +405,12 @@ void ModbusShaker::drop_void_set_point() noexcept {
 void ModbusShaker::write_set_point() {
     const auto set_point = orders_.take();
     if (!set_point) return;
-    told_.reset();
+    commanded_.reset();
     if (!write_steps(*set_point)) {
         if (outranked() || !link_.connected()) ++counts_.set_points_discarded;
     } else {
         ++counts_.set_points_written;
-        if (set_point->amplitude_g > 0 || set_point->run_at_zero) told_ = set_point;
+        if (set_point->amplitude_g > 0 || set_point->run_at_zero) commanded_ = set_point;
     }
     if (link_.connected() && !outranked())
         poll(clock_.now());  // a reading newer than the set-point, then not busy
@@ -444,11 +444,12 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
     }
     steps.push_back({"ramp time", map.ramp_time, set_point.ramp_s});
     steps.push_back({"amplitude", map.amplitude, set_point.amplitude_g});
-    // A device that is thought to run and does not has tripped: it is told nothing, and the
+    // A device that is thought to run and does not has tripped: it gets no command, and the
     // read-back differs.
     if (!excite || !running) steps.push_back({"run", map.run, excite ? 1.0 : 0.0});
     if (!write_each(steps)) return false;
-    if (excite && running) return verify("run", map.run, encoded(map.run, 1)) == Written::as_told;
+    if (excite && running)
+        return verify("run", map.run, encoded(map.run, 1)) == Written::as_written;
     return true;
 }
 
@@ -456,7 +457,7 @@ bool ModbusShaker::write_each(std::span<const Step> steps) {
     for (const Step& step : steps) {
         if (watchdog_due(clock_.now())) serve_watchdog(clock_.now());
         if (!link_.connected()) return false;
-        if (write_and_verify(step.role, step.reg, step.value) != Written::as_told) return false;
+        if (write_and_verify(step.role, step.reg, step.value) != Written::as_written) return false;
     }
     return true;
 }
@@ -495,11 +496,11 @@ void ModbusShaker::write_timeout() {
     if (feed_refused_) settle("watchdog timeout refused: " + reply.text());
     if (!reply.ok()) return;
     timeout_due_ = false;
-    next_look_ = clock_.now();
+    next_check_ = clock_.now();
 }
 
-void ModbusShaker::look_at_timeout(Time now) {
-    next_look_ = now + kTimeoutLook;
+void ModbusShaker::check_timeout(Time now) {
+    next_check_ = now + kTimeoutPeriod;
     const proto::Register& reg = settings_.registers.watchdog_timeout;
     Words words{}, written{};
     const auto raw = std::span(words).first(reg.words());
@@ -513,7 +514,7 @@ void ModbusShaker::look_at_timeout(Time now) {
             ? timeout_read_s_ > 0 && timeout_read_s_ <= to_seconds(kLongestWatchdogTimeout)
             : reply.ok() && same_raw(reg, ours, raw);
     const auto seen = good ? WatchdogTimeout::kept : WatchdogTimeout::changed;
-    if (std::exchange(timeout_seen_, seen) != seen) next_poll_ = now;  // to be told at once
+    if (std::exchange(timeout_seen_, seen) != seen) next_poll_ = now;  // to be reported at once
     settle(good ? "read back"
            : reply.ok()
                ? "watchdog timeout reads back as " + std::to_string(timeout_read_s_) +
@@ -541,7 +542,7 @@ void ModbusShaker::poll(Time now) {
     if (const auto changed = changed_by_others(reading); !changed.empty()) {
         ++counts_.read_back_mismatches;
         write_failed_ = true;
-        told_.reset();  // told once
+        commanded_.reset();  // reported once
         latest_.store(reading);
         settle(changed);
     } else {
@@ -551,15 +552,15 @@ void ModbusShaker::poll(Time now) {
     if (on_reading_) on_reading_();
 }
 
-std::string ModbusShaker::differs(const char* role, const proto::Register& reg, double told) {
+std::string ModbusShaker::differs(const char* role, const proto::Register& reg, double commanded) {
     Words words = present(reg);
     const auto ours = std::span(words).first(reg.words());
-    static_cast<void>(proto::encode(reg, told, ours));
+    static_cast<void>(proto::encode(reg, commanded, ours));
     const auto read = image_.words_of(reg);
     return same_raw(reg, ours, read)
                ? std::string()
                : std::string(role) + " was changed by another: reads back as " +
-                     std::to_string(proto::decode(reg, read)) + ", was told " +
+                     std::to_string(proto::decode(reg, read)) + ", commanded " +
                      std::to_string(proto::decode(reg, ours));
 }
 

@@ -39,8 +39,8 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] ShakerCounters counters() const noexcept override;
     [[nodiscard]] LinkState state() const noexcept override { return state_.load(); }
     void on_reading(std::function<void()> wake) override { on_reading_ = std::move(wake); }
-    void on_stop_written(std::function<void()> told) override {
-        on_stop_written_ = std::move(told);
+    void on_stop_written(std::function<void()> confirmed) override {
+        on_stop_written_ = std::move(confirmed);
     }
     [[nodiscard]] std::uint64_t beats() const noexcept override { return beats_; }
     [[nodiscard]] ShakerIdentity identity() const override;
@@ -74,7 +74,7 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] Reply read(const proto::Register& reg, std::span<std::uint16_t> words);
 
     [[nodiscard]] Words present(const proto::Register& reg) noexcept;
-    enum class Written : std::uint8_t { as_told, otherwise, not_written };
+    enum class Written : std::uint8_t { as_written, otherwise, not_written };
     /// Writes a register and reads it back; `otherwise` and exceptions leave the state degraded.
     [[nodiscard]] Written write_and_verify(const char* role, const proto::Register& reg,
                                            double value);
@@ -97,12 +97,13 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] bool choose_random(const RandomSetPoint& random);
     [[nodiscard]] bool same_kind(const ShakerSetPoint& set_point,
                                  const ShakerReading& now) const noexcept;
-    [[nodiscard]] std::string differs(const char* role, const proto::Register& reg, double told);
+    [[nodiscard]] std::string differs(const char* role, const proto::Register& reg,
+                                      double commanded);
     void drop_void_set_point() noexcept;
     [[nodiscard]] bool watchdog_due(Time now) const noexcept;
     void serve_watchdog(Time now);
     void write_timeout();
-    void look_at_timeout(Time now);
+    void check_timeout(Time now);
     /// After so long without a feed the device stops.
     [[nodiscard]] Time watchdog_timeout() const noexcept { return 3 * settings_.watchdog_period; }
     void poll(Time now);
@@ -113,8 +114,8 @@ class ModbusShaker final : public Shaker {
     // shaker_psd.cpp
     [[nodiscard]] bool psd_due() noexcept;
     void read_psd_part();
-    void tell_psd(std::string why_not);
-    /// Registers that no longer hold what the table was told; empty: they do.
+    void answer_psd(std::string why_not);
+    /// Registers that no longer hold what was commanded; empty: all do.
     [[nodiscard]] std::string changed_by_others(const ShakerReading& reading);
 
     void settle(const std::string& why);
@@ -161,15 +162,15 @@ class ModbusShaker final : public Shaker {
     bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
     WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
     double timeout_read_s_ = 0;
-    int asks_left_ = 0;                     ///< who it is
-    bool closed_by_us_ = false;             ///< the link, or by asking: the device is the same
-    std::uint64_t psd_request_ = 0;         ///< that is being read, or was
-    int psd_attempts_left_ = 0;             ///< of it; 0: it is answered
-    std::vector<std::uint16_t> psd_words_;  ///< of it so far
-    std::optional<ShakerSetPoint> told_;    ///< what the table does by our word; none: at rest
+    int asks_left_ = 0;                        ///< who it is
+    bool closed_by_us_ = false;                ///< the link, or by asking: the device is the same
+    std::uint64_t psd_request_ = 0;            ///< that is being read, or was
+    int psd_attempts_left_ = 0;                ///< of it; 0: it is answered
+    std::vector<std::uint16_t> psd_words_;     ///< of it so far
+    std::optional<ShakerSetPoint> commanded_;  ///< in force by our command; none: at rest
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;
-    Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0, next_look_ = 0;
+    Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0, next_check_ = 0;
     Time last_feed_ = 0, stop_alone_until_ = 0;
 };
 

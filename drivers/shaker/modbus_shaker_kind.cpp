@@ -69,34 +69,34 @@ bool ModbusShaker::choose_random(const RandomSetPoint& random) {
 }
 
 std::string ModbusShaker::changed_by_others(const ShakerReading& reading) {
-    // A device that has stopped by itself and says so has a trip of its own.
-    if (!told_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
+    // A device that has stopped by itself and reports it has a trip of its own.
+    if (!commanded_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
         reading.emergency_stop_open)
         return {};
     const proto::ShakerRegisters& map = settings_.registers;
     std::string found;
     if (map.random || map.sweep)
         found = differs("mode", map.mode,
-                        told_->random  ? kModeRandom
-                        : told_->sweep ? kModeSweep
-                                       : kModeSine);
-    if (const auto& random = told_->random) {
+                        commanded_->random  ? kModeRandom
+                        : commanded_->sweep ? kModeSweep
+                                            : kModeSine);
+    if (const auto& random = commanded_->random) {
         if (found.empty())
             found = differs("profile number", map.random->profile_number, random->profile);
         if (found.empty())
             found = differs("profile level", map.random->profile_level_db, random->level_db);
         if (found.empty())
             found = differs("profile checksum", map.random->profile_checksum, random->checksum);
-    } else if (const auto& sweep = told_->sweep) {
+    } else if (const auto& sweep = commanded_->sweep) {
         if (found.empty()) found = differs("sweep from", map.sweep->from, sweep->from_hz);
         if (found.empty()) found = differs("sweep to", map.sweep->to, sweep->to_hz);
         if (found.empty())
             found = differs("sweep rate", map.sweep->rate, sweep->octaves_per_minute);
     } else if (found.empty()) {
-        found = differs("frequency", map.frequency, told_->frequency_hz);
+        found = differs("frequency", map.frequency, commanded_->frequency_hz);
     }
-    if (found.empty()) found = differs("amplitude", map.amplitude, told_->amplitude_g);
-    if (found.empty()) found = differs("ramp time", map.ramp_time, told_->ramp_s);
+    if (found.empty()) found = differs("amplitude", map.amplitude, commanded_->amplitude_g);
+    if (found.empty()) found = differs("ramp time", map.ramp_time, commanded_->ramp_s);
     if (found.empty()) found = differs("run", map.run, 1);
     return found;
 }

@@ -33,7 +33,8 @@ struct ShakerSettings {
     Time watchdog_period = 500 * kMillisecond;   ///< feed
     Time backoff_min = 100 * kMillisecond;       ///< reconnect, doubled up to backoff_max
     Time backoff_max = 5 * kSecond;
-    /// Of a stop, where ramp time and run are not written in one request: what the ramp may cost.
+    /// Most that the ramp may cost in a stop where ramp time and run are not written in one
+    /// request.
     Time stop_ramp_timeout = 100 * kMillisecond;
     /// Each new link is asked who it is, at rest (function 17): how long for; 0: it is not.
     Time identify = 0;
@@ -84,14 +85,14 @@ inline constexpr std::uint16_t kShakerIdle = 0, kShakerRamping = 1;
 inline constexpr std::uint16_t kShakerRunning = 2;
 inline constexpr std::uint16_t kShakerFault = 4;
 
-/// The register that says after how long without a feed the controller stops.
+/// The register that gives after how long without a feed the controller stops.
 enum class WatchdogTimeout : std::uint8_t {
-    unread,   ///< not looked at since the link was made
+    unread,   ///< not read since the link was made
     kept,     ///< what was written; of a register that is only read: short enough
     changed,  ///< another value, or none to be had
 };
 
-/// Of a controller with registers for random vibration, as read back.
+/// State of a controller with registers for random vibration, as read back.
 struct RandomReading {
     enum class State : std::uint8_t { idle, levelling, at_level, aborted };
     bool random = false;  ///< the mode
@@ -104,13 +105,13 @@ struct RandomReading {
     std::uint8_t abort_reason = 0;
 };
 
-/// Of a controller with registers for sweeps, as read back.
+/// State of a controller with registers for sweeps, as read back.
 struct SweepReading {
     bool on = false;  ///< the mode
     double from_hz = 0, to_hz = 0, octaves_per_minute = 0;
-    double actual_hz = 0;  ///< where it says that it is; not finite: it does not
+    double actual_hz = 0;  ///< reported by it; not finite: it reports none
 
-    /// It is told to do this, as far as registers resolve it.
+    /// This sweep is what is commanded, as far as registers resolve it.
     [[nodiscard]] bool is(const SweepSetPoint& wanted) const noexcept {
         return on && std::abs(from_hz - wanted.from_hz) < 0.01 &&
                std::abs(to_hz - wanted.to_hz) < 0.01 &&
@@ -119,13 +120,13 @@ struct SweepReading {
     }
 };
 
-/// Who the controller at the newest link says it is.
+/// Identity that the controller at the newest link reports.
 struct ShakerIdentity {
     bool known = false;  ///< it was asked, and has answered or not
-    std::string text{};  ///< empty: it says nothing
+    std::string text{};  ///< empty: it reports none
 };
 
-/// What the controller says that it measured of the last random vibration.
+/// What the controller reports that it measured of the last random vibration.
 struct ShakerPsd {
     std::uint64_t request = 0;  ///< of read_psd() that this answers; 0: of none yet
     /// Hz and g^2/Hz of each pair, all that there are, as they came; empty: `why_not`.
@@ -196,7 +197,7 @@ class Shaker {
     /// it connects again and is written first. Any thread; never blocks.
     virtual void hang_up_until(Time /*time*/) noexcept {}
     /// From now on, or no longer, nothing is written but a stop: no set-point is taken, the
-    /// watchdog is neither fed nor told its timeout. Any thread; never blocks.
+    /// watchdog is neither fed nor given its timeout. Any thread; never blocks.
     virtual void read_only(bool /*on*/) noexcept {}
     /// How often stop_now() was called.
     [[nodiscard]] virtual std::uint64_t stops() const noexcept = 0;
@@ -221,7 +222,7 @@ class Shaker {
     /// Rounds of the shaker's thread so far: it lives as long as they grow.
     [[nodiscard]] virtual std::uint64_t beats() const noexcept { return 0; }
     /// Called in the shaker's thread when the device has confirmed a stop. Before start().
-    virtual void on_stop_written(std::function<void()> /*told*/) {}
+    virtual void on_stop_written(std::function<void()> /*confirmed*/) {}
     /// Ends the thread. Does not stop the shaker: call stop_now() and wait for stop_pending() to
     /// clear first.
     virtual void shut_down() noexcept = 0;

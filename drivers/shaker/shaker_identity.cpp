@@ -1,4 +1,4 @@
-// Who the controller says it is: the least urgent of all requests, at rest only.
+// The identity that the controller reports: the least urgent of all requests, at rest only.
 #include <utility>
 
 #include "drivers/shaker/modbus_shaker.hpp"
@@ -20,11 +20,12 @@ void ModbusShaker::link_is_new() {
 }
 
 bool ModbusShaker::identity_due() const noexcept {
-    return asks_left_ > 0 && polled_ && !told_ && !orders_.waiting() && latest_.load().at_rest();
+    return asks_left_ > 0 && polled_ && !commanded_ && !orders_.waiting() &&
+           latest_.load().at_rest();
 }
 
 /// A late reply would be taken for the next one: a device that does not answer, or hangs up, costs
-/// its link. Asked twice, it says nothing.
+/// its link. Asked twice, it reports nothing.
 void ModbusShaker::ask_identity() {
     std::string text;
     link_.respond_within(settings_.identify);

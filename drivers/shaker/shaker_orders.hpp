@@ -9,7 +9,7 @@
 
 namespace vibrig::drivers {
 
-/// What the shaker's thread has been told: a stop, or else at most one set-point.
+/// What the shaker's thread has been ordered to write: a stop, or else at most one set-point.
 /// Stopping is lock-free. A set-point carries the stop count it was requested under and is void
 /// once that has moved, so none that was requested before a stop can be written after it, whatever
 /// threads were preempted where.

@@ -34,7 +34,7 @@ bool ModbusShaker::psd_due() noexcept {
         psd_attempts_left_ = settings_.registers.random->psd_block->attempts;
         psd_words_.clear();
     }
-    return psd_attempts_left_ > 0 && polled_ && !told_ && !orders_.waiting() &&
+    return psd_attempts_left_ > 0 && polled_ && !commanded_ && !orders_.waiting() &&
            latest_.load().at_rest();
 }
 
@@ -51,7 +51,7 @@ void ModbusShaker::read_psd_part() {
     if (reply.kind == ReplyKind::overtaken || outranked()) return;  // a stop: read after it
     if (reply.ok()) {
         psd_words_.insert(psd_words_.end(), part.begin(), part.end());
-        if (psd_words_.size() == all) tell_psd({});
+        if (psd_words_.size() == all) answer_psd({});
         return;
     }
     psd_words_.clear();
@@ -60,25 +60,25 @@ void ModbusShaker::read_psd_part() {
         next_attempt_ = clock_.now();
     }
     if (--psd_attempts_left_ == 0)
-        tell_psd("reading " + std::to_string(part.size()) + " registers from " +
-                 std::to_string(address) + ": " + reply.text() + ", tried " +
-                 std::to_string(block.attempts) + (block.attempts == 1 ? " time" : " times"));
+        answer_psd("reading " + std::to_string(part.size()) + " registers from " +
+                   std::to_string(address) + ": " + reply.text() + ", tried " +
+                   std::to_string(block.attempts) + (block.attempts == 1 ? " time" : " times"));
 }
 
-void ModbusShaker::tell_psd(std::string why_not) {
+void ModbusShaker::answer_psd(std::string why_not) {
     const proto::PsdBlock& block = *settings_.registers.random->psd_block;
     proto::Register hz = block.first;
     hz.scale = 1;
-    ShakerPsd told{psd_request_, {}, std::move(why_not)};
+    ShakerPsd answer{psd_request_, {}, std::move(why_not)};
     const std::span<const std::uint16_t> words = psd_words_;
     for (std::size_t at = 0; at < words.size(); at += kWordsOfPair)
-        told.pairs.push_back({proto::decode(hz, words.subspan(at, 2)),
-                              proto::decode(block.first, words.subspan(at + 2, 2))});
+        answer.pairs.push_back({proto::decode(hz, words.subspan(at, 2)),
+                                proto::decode(block.first, words.subspan(at + 2, 2))});
     psd_attempts_left_ = 0;
     psd_words_.clear();
     {
         const std::lock_guard lock(psd_mutex_);
-        psd_ = std::move(told);
+        psd_ = std::move(answer);
     }
     if (on_reading_) on_reading_();
 }

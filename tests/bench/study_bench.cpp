@@ -1,5 +1,5 @@
 // What a simulated campaign of a study costs: all of it with the instruction set that studies have
-// unless told (baseline) and with the best, and what of it is the simulated rig.
+// unless told otherwise (baseline) and with the best, and what of it is the simulated rig.
 #include <benchmark/benchmark.h>
 
 #include "daemon/study/campaigns.hpp"

@@ -111,7 +111,7 @@ constexpr std::array<Description, 48> kDescriptions{{
      "wrong-profile=NUMBER  random: this profile is loaded, whatever number is written and read "
      "back"},
     {FaultKind::profile_level_wrong, "profile-level-wrong", Value::decibels, false,
-     "profile-level-wrong=DB  random: the table does so much more than is told and read back"},
+     "profile-level-wrong=DB  random: the table does so much more than is commanded and read back"},
     {FaultKind::no_abort_bands, "no-abort-bands", Value::none, false,
      "no-abort-bands        random: the controller has none, and its control_state says so"},
     {FaultKind::profile_tilted, "profile-tilted", Value::decibels, false,
@@ -126,11 +126,13 @@ constexpr std::array<Description, 48> kDescriptions{{
     {FaultKind::psd_refused, "psd-refused", Value::none, false,
      "psd-refused           random: the measured PSD cannot be read (exception 4)"},
     {FaultKind::sweep_rate_scaled, "sweep-rate-scaled", Value::either_way, false,
-     "sweep-rate-scaled=FACTOR  sweeps go so many times as fast as is told; 0: not at all, below "
+     "sweep-rate-scaled=FACTOR  sweeps go so many times as fast as is commanded; 0: not at all, "
+     "below "
      "0:\n"
      "                        the other way"},
     {FaultKind::actual_as_told, "actual-as-told", Value::none, false,
-     "actual-as-told        the register of the actual frequency shows the sweep that is told"},
+     "actual-as-told        the register of the actual frequency shows the sweep that is "
+     "commanded"},
     {FaultKind::timeout_register, "timeout-register", Value::whole, false,
      "timeout-register=MS   another master keeps this in the watchdog's timeout register; 0: off"},
     {FaultKind::latched_fault, "latched-fault", Value::none, false,

@@ -101,7 +101,7 @@ struct Sample {
     std::array<bool, kChannels> valid{true, true, true, true, true, true};
 };
 
-/// Spoils samples and frames as told. Deterministic for a seed.
+/// Spoils samples and frames as set. Deterministic for a seed.
 class Faults {
   public:
     explicit Faults(std::uint64_t seed) : random_(seed, 4) {}

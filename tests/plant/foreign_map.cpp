@@ -137,15 +137,15 @@ void ForeignMap::show(Role& role, std::span<const std::uint16_t> own,
     const auto at = std::span(image).subspan(role.foreign.address, role.foreign.words());
     const auto now = own.subspan(role.own.address, role.own.words());
     std::array<std::uint16_t, 2> words{};
-    const auto as_told = std::span(words).first(role.own.words());
+    const auto as_written = std::span(words).first(role.own.words());
     // Its own registers may be coarser: what was written is what is read back.
-    if (!role.told.empty() &&
-        proto::encode(role.own, proto::decode(role.foreign, role.told), as_told) &&
-        std::ranges::equal(as_told, now)) {
-        std::ranges::copy(role.told, at.begin());
+    if (!role.written.empty() &&
+        proto::encode(role.own, proto::decode(role.foreign, role.written), as_written) &&
+        std::ranges::equal(as_written, now)) {
+        std::ranges::copy(role.written, at.begin());
         return;
     }
-    role.told.clear();
+    role.written.clear();
     // A value that the foreign register cannot hold stays what it was, as with a real one.
     static_cast<void>(proto::encode(role.foreign, proto::decode(role.own, now), at));
 }
@@ -187,7 +187,7 @@ Answer ForeignMap::write(ShakerController& shaker, std::size_t address,
     // As one request to the controller's own registers, which are next to each other.
     auto own = shaker.holding();
     std::size_t first = own.size(), end = 0;
-    std::vector<std::pair<Role*, std::vector<std::uint16_t>>> told;
+    std::vector<std::pair<Role*, std::vector<std::uint16_t>>> written;
     for (Role& role : written_) {
         const Register& to = role.foreign;
         if (to.table != RegisterTable::holding || to.address >= address + values.size() ||
@@ -198,11 +198,11 @@ Answer ForeignMap::write(ShakerController& shaker, std::size_t address,
         if (!proto::encode(role.own, proto::decode(to, words), at)) return Answer::illegal_value;
         first = std::min<std::size_t>(first, role.own.address);
         end = std::max(end, role.own.address + role.own.words());
-        told.emplace_back(&role, std::vector(words.begin(), words.end()));
+        written.emplace_back(&role, std::vector(words.begin(), words.end()));
     }
     const auto answer = shaker.write(first, std::span(own).subspan(first, end - first));
     if (answer == Answer::accepted)
-        for (auto& [role, words] : told) role->told = std::move(words);
+        for (auto& [role, words] : written) role->written = std::move(words);
     return answer;
 }
 

@@ -34,7 +34,7 @@ class ForeignMap {
   private:
     struct Role {
         proto::Register own, foreign;
-        std::vector<std::uint16_t> told;  ///< as last written; empty: nothing was
+        std::vector<std::uint16_t> written;  ///< as last written; empty: nothing was
     };
     [[nodiscard]] const Role* role_at(std::size_t address) const noexcept;
     void show(Role& role, std::span<const std::uint16_t> own, std::vector<std::uint16_t>& image);

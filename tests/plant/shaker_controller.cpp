@@ -112,7 +112,7 @@ ShakerController::Answer ShakerController::write(std::size_t address,
 
     const bool will_sweep = next[kMode] == 2;
     if (!(will_sweep && moving))
-        told_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
+        commanded_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
     if (!lies_.frequency_ignored && !(will_sweep && moving))
         table_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
     if (lies_.timeout_register) next[kMap.watchdog_timeout.address] = *lies_.timeout_register;
@@ -154,7 +154,7 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     words[kProfileChecksum + 1] = static_cast<std::uint16_t>(checksum);
     split(words, kMeasuredRms, std::sqrt(mean_square_) / 1e-4);
     words[kControlState] = control_state();
-    split(words, kActualFrequency, 1e3 * (lies_.actual_as_told ? told_hz_ : table_hz_));
+    split(words, kActualFrequency, 1e3 * (lies_.actual_as_told ? commanded_hz_ : table_hz_));
     const auto put = [&words](std::size_t at, double number) {
         const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(number));
         words[at] = static_cast<std::uint16_t>(bits >> 16);
@@ -228,7 +228,7 @@ void ShakerController::sweep(double dt_s) noexcept {
     swept_s_ += dt_s;
     if (swept_s_ < kSweepRests_s) return;
     const double octaves = 0.01 * holding_[kSweepRate] * dt_s / 60;
-    told_hz_ = swept(told_hz_, octaves);
+    commanded_hz_ = swept(commanded_hz_, octaves);
     if (!lies_.frequency_ignored) table_hz_ = swept(table_hz_, lies_.sweep_rate_scaled * octaves);
 }
 

@@ -121,7 +121,7 @@ class ShakerController {
     double mean_square_ = 0;  ///< of the table as the controller's accelerometer has it, g^2
     double outside_bands_s_ = 0, at_level_s_ = 0;
     double swept_s_ = 0;                      ///< at the level of a sweep
-    double told_hz_ = 15;                     ///< where a sweep would be as it is told
+    double commanded_hz_ = 15;                ///< where a sweep would be as it is commanded
     std::uint16_t aborted_ = 0;               ///< why
     std::vector<std::array<double, 2>> psd_;  ///< measured last: Hz, g^2/Hz at the table
 };

@@ -28,16 +28,18 @@ struct ShakerLies {
     /// Of random vibration: this profile is loaded, whatever number is written and read back; the
     /// checksum is of what is loaded.
     std::optional<std::uint16_t> wrong_profile{};
-    double profile_level_wrong = 0;  ///< dB, the table does so much more than is told and measured
-    double profile_tilted = 0;       ///< dB an octave, about the profile, at the same rms
-    bool psd_stale = false;          ///< the measured PSD stays what it was
-    bool psd_nan = false;            ///< a line of it is no number
-    double psd_scaled = 1;           ///< it is so many times what was measured
-    bool psd_refused = false;        ///< it cannot be read: exception 4
-    bool no_abort_bands = false;     ///< the controller has none, and says so
-    /// Sweeps go so many times as fast as is told: 0 not at all, below 0 the other way.
+    double profile_level_wrong =
+        0;                      ///< dB, the table does so much more than is commanded and measured
+    double profile_tilted = 0;  ///< dB an octave, about the profile, at the same rms
+    bool psd_stale = false;     ///< the measured PSD stays what it was
+    bool psd_nan = false;       ///< a line of it is no number
+    double psd_scaled = 1;      ///< it is so many times what was measured
+    bool psd_refused = false;   ///< it cannot be read: exception 4
+    bool no_abort_bands = false;  ///< the controller has none, and says so
+    /// Sweeps go so many times as fast as is commanded: 0 not at all, below 0 the other way.
     double sweep_rate_scaled = 1;
-    bool actual_as_told = false;  ///< the register of the frequency shows the sweep that was told
+    bool actual_as_told =
+        false;  ///< the register of the frequency shows the sweep that was commanded
     /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
     std::optional<std::uint16_t> timeout_register{};
     bool latched_fault = false;  ///< trips by itself when this begins

@@ -15,7 +15,7 @@ namespace vibrig::plant {
 struct SimulationSettings {
     bool lockstep = true;                    ///< the rig's clock; else CLOCK_MONOTONIC
     std::optional<double> speed;             ///< lockstep: at most this many times real time
-    std::optional<double> duration_s;        ///< simulated; none: until told to stop
+    std::optional<double> duration_s;        ///< simulated; none: until ordered to stop
     std::int64_t resend_ns = 1'000'000'000;  ///< lockstep: wall time without an acknowledgement
 };
 

@@ -74,7 +74,7 @@ TEST(Drift, RampsWithTheHoursAndWithinADwell) {
     EXPECT_EQ(change(drift, 1, kF), 0);
 }
 
-TEST(Drift, WalksScattersAndWandersAsMuchAsItIsTold) {
+TEST(Drift, WalksScattersAndWandersAsMuchAsIsStated) {
     // GIVEN 100 rigs, seeds 1 to 100, of three gyros each
     double walk = 0, scatter = 0, markov = 0, lagged = 0, across = 0;
     const int n = 100;

@@ -71,7 +71,7 @@ class ForeignMapTest : public testing::Test {
     ShakerController shaker_{20, 25};
 };
 
-TEST_F(ForeignMapTest, TheTableDoesWhatItIsToldThere) {
+TEST_F(ForeignMapTest, TheTableDoesWhatIsCommandedThere) {
     EXPECT_NEAR(value(at_.frequency), 15, 1e-6);
     EXPECT_EQ(write(at_.frequency, 16.5), Answer::accepted);
     EXPECT_EQ(write(at_.amplitude, 9), Answer::accepted);

@@ -88,7 +88,7 @@ TEST(Misfit, CrossAxisMotionInQuadratureAddsItsOwnSquareOnly) {
     EXPECT_GT(std::abs(rates_over_a_period(truth)[0] - rates_over_a_period(Truth{})[0]), 1e-4);
 }
 
-TEST(Misfit, ATiltedVibrationKeepsItsSizeAndLeansAsTold) {
+TEST(Misfit, ATiltedVibrationKeepsItsSizeAndLeansAsStated) {
     Truth truth;
     truth.tilt_deg = {0.5, -1};
     PlatformModel model(truth);

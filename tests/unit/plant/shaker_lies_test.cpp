@@ -34,7 +34,7 @@ double measured_g(const ShakerController& shaker) {
 
 constexpr std::uint16_t kIdle = 0, kRamping = 1, kRunning = 2, kFault = 4;
 
-/// A shaker with a watchdog of 1 s that was told to do 5 g, ramp 0.5 s, and was fed for 2 s.
+/// A shaker with a watchdog of 1 s that was commanded to do 5 g, ramp 0.5 s, and was fed for 2 s.
 ShakerController shaking(const ShakerLies& lies) {
     ShakerController shaker(20, 25);
     shaker.lie(lies);

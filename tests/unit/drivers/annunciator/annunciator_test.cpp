@@ -40,17 +40,17 @@ class Said {
     std::vector<std::string> lines_;
 };
 
-TEST(Annunciator, TheCommandIsToldWhatHappenedAsJson) {
-    const Script script("cat >told.new && mv told.new told");
+TEST(Annunciator, TheCommandGetsWhatHappenedAsJson) {
+    const Script script("cat >paged.new && mv paged.new paged");
     Annunciator annunciator(with_command(script), {});
     annunciator.announce(HornPattern::abort, "a \"quoted\"\nline\\ with \xce\xa9");
-    ASSERT_TRUE(eventually([&] { return !script.text_of("told").empty(); }));
-    const auto told = script.text_of("told");
-    EXPECT_NE(told.find(R"({"source":"vibrigd","kind":"abort","time":"2)"), std::string::npos)
-        << told;
-    EXPECT_NE(told.find("\"text\":\"a \\\"quoted\\\"\\u000aline\\\\ with \xce\xa9\"}\n"),
+    ASSERT_TRUE(eventually([&] { return !script.text_of("paged").empty(); }));
+    const auto paged = script.text_of("paged");
+    EXPECT_NE(paged.find(R"({"source":"vibrigd","kind":"abort","time":"2)"), std::string::npos)
+        << paged;
+    EXPECT_NE(paged.find("\"text\":\"a \\\"quoted\\\"\\u000aline\\\\ with \xce\xa9\"}\n"),
               std::string::npos)
-        << told;
+        << paged;
 }
 
 TEST(Annunciator, NobodyWaitsForACommandThatHangsAndWhatPilesUpIsBounded) {
@@ -64,7 +64,7 @@ TEST(Annunciator, NobodyWaitsForACommandThatHangsAndWhatPilesUpIsBounded) {
         // WHEN alarms come in a storm
         for (int i = 0; i < 1000; ++i)
             annunciator.announce(HornPattern::alarm, "alarm " + std::to_string(i));
-        // THEN four are told, sixteen wait, and the rest is counted
+        // THEN four are paged, sixteen wait, and the rest is counted
         EXPECT_TRUE(eventually([&] { return annunciator.status().started == 4; }));
         EXPECT_TRUE(eventually([&] { return annunciator.status().left_out >= 1000 - 16 - 4; }));
         EXPECT_LE(annunciator.status().left_out, 1000u - 16u);
@@ -82,7 +82,7 @@ TEST(Annunciator, AFailureOfTheCommandIsSaidAndCounted) {
     EXPECT_NE(annunciator.status().command_note.find("status 3"), std::string::npos);
 }
 
-TEST(Annunciator, ACommandThatCannotBeRunIsToldBeforeItIsNeeded) {
+TEST(Annunciator, ACommandThatCannotBeRunIsReportedBeforeItIsNeeded) {
     const Script script("exit 0", false);
     Said said;
     Annunciator annunciator(with_command(script), said.taker());
@@ -151,7 +151,7 @@ TEST_F(AnnunciatorOnTheWire, AHornThatLiesIsItselfAnAlarm) {
     EXPECT_NE(annunciator.status().horn_note.find("reads back off"), std::string::npos);
 }
 
-TEST_F(AnnunciatorOnTheWire, ADeviceThatGoesAwayIsToldBeforeItIsNeeded) {
+TEST_F(AnnunciatorOnTheWire, ADeviceThatGoesAwayIsReportedBeforeItIsNeeded) {
     CoilServer server("honest");
     Said said;
     Annunciator annunciator(with_horn(server), said.taker());

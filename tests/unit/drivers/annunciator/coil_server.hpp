@@ -22,7 +22,7 @@ namespace vibrig::drivers::test {
            0;  // NOLINT
 }
 
-/// coil_server.py as a child: what it was told to write, as it understood it.
+/// coil_server.py as a child: what it was asked to write, as it understood it.
 class CoilServer {
   public:
     explicit CoilServer(const char* kind) {

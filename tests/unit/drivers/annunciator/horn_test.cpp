@@ -10,7 +10,7 @@ namespace {
 
 constexpr Time kHalf = kSecond / 2;
 
-TEST(HornPattern, EachIsToldFromTheOthersByEar) {
+TEST(HornPattern, EachIsDistinguishedFromTheOthersByEar) {
     // Share of 20 s in which the horn sounds, and how often it begins to.
     struct Heard {
         int halves = 0, starts = 0;
@@ -79,16 +79,16 @@ TEST_F(HornOnTheWire, AHornThatAcknowledgesAndStaysSilentIsFoundByItsReadBack) {
     Horn horn(settings(server));
     ASSERT_TRUE(horn.show(HornPattern::none, 0));
     EXPECT_FALSE(horn.show(HornPattern::disobeyed, kHalf));
-    EXPECT_NE(horn.note().find("the lamp (coil 4) was told on and reads back off"),
+    EXPECT_NE(horn.note().find("the lamp (coil 4) was switched on and reads back off"),
               std::string::npos)
         << horn.note();
-    // THEN it is told again, every time
+    // THEN it is commanded again, every time
     EXPECT_FALSE(horn.show(HornPattern::disobeyed, 2 * kHalf));
     EXPECT_TRUE(eventually([&] { return server.count("coil 3 1") == 2; }));
-    EXPECT_TRUE(horn.show(HornPattern::none, 3 * kHalf)) << "off it is as told";
+    EXPECT_TRUE(horn.show(HornPattern::none, 3 * kHalf)) << "off it is as commanded";
 }
 
-TEST_F(HornOnTheWire, AHornThatRefusesIsToldWithItsException) {
+TEST_F(HornOnTheWire, AHornThatRefusesIsReportedWithItsException) {
     CoilServer server("refuses");
     Horn horn(settings(server));
     EXPECT_FALSE(horn.show(HornPattern::abort, 0));

@@ -18,12 +18,12 @@ bool ends(PageCommand& command, Time now) {
 }
 
 TEST(PageCommand, ReceivesTheTextOnItsInputAndTheEndOfIt) {
-    const Script script("cat >told && echo done >over");
+    const Script script("cat >paged && echo done >over");
     PageCommand command(script.path(), kLimit);
     const std::string text(PageCommand::kLongestText, 'x');
     ASSERT_EQ(command.start(text, 0), "");
     ASSERT_TRUE(ends(command, 0));
-    EXPECT_EQ(script.text_of("told"), text);
+    EXPECT_EQ(script.text_of("paged"), text);
     EXPECT_EQ(script.text_of("over"), "done\n");
     EXPECT_EQ(command.counters().failed, 0u);
 }
@@ -84,7 +84,7 @@ TEST(PageCommand, AFloodOfOutputFillsNothing) {
     EXPECT_EQ(command.counters().failed, 0u);
 }
 
-TEST(PageCommand, AFailureIsToldWithItsStatus) {
+TEST(PageCommand, AFailureIsReportedWithItsStatus) {
     const Script script("exit 7");
     PageCommand command(script.path(), kLimit);
     ASSERT_EQ(command.start("{}", 0), "");
@@ -97,7 +97,7 @@ TEST(PageCommand, AFailureIsToldWithItsStatus) {
     EXPECT_EQ(command.counters().failed, 1u);
 }
 
-TEST(PageCommand, WhatDoesNotExistOrMayNotRunIsToldAtOnce) {
+TEST(PageCommand, WhatDoesNotExistOrMayNotRunIsReportedAtOnce) {
     const Script script("exit 0", false);
     PageCommand forbidden(script.path(), kLimit);
     EXPECT_NE(forbidden.start("{}", 0).find("page-me: cannot be started: Permission denied"),

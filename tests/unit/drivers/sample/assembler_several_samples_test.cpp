@@ -161,7 +161,7 @@ TEST_F(SeveralSamples, ASignalThatTheDbcLacksIsNamed) {
     EXPECT_THROW(SampleAssembler(fd_dbc(), settings, {}), BindingError);
 }
 
-TEST_F(SeveralSamples, WithoutACounterTheyCannotBeToldApart) {
+TEST_F(SeveralSamples, WithoutACounterTheyCannotBeDistinguished) {
     auto settings = fd_settings(kFdPeriod);
     settings.bindings.sync_count = "";
     try {

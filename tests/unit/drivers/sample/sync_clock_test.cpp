@@ -117,7 +117,7 @@ TEST(SyncClock, TimesCountsThatNeverCame) {
     EXPECT_EQ(clock.time_of(199), kStart + 199 * kPeriod);
 }
 
-TEST(SyncClock, ForgetsWhenToldTo) {
+TEST(SyncClock, ForgetsWhenAskedTo) {
     SyncClock clock(kPeriod);
     EXPECT_EQ(clock.time_of(5), 0);
     for (std::int64_t count = 500; count < 600; ++count)

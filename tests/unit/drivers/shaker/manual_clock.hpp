@@ -11,7 +11,7 @@
 
 namespace vibrig::drivers::test {
 
-/// A clock that stands still until it is told the time, for one waiter.
+/// A clock that stands still until it is set, for one waiter.
 class ManualClock final : public Clock {
   public:
     [[nodiscard]] Time now() const noexcept override {

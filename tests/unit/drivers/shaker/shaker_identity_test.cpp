@@ -1,4 +1,5 @@
-// Who the controller says it is: asked of each new link, at rest only, and never in the way.
+// The identity that the controller reports: asked of each new link, at rest only, and never in the
+// way.
 #include <gtest/gtest.h>
 
 #include <algorithm>

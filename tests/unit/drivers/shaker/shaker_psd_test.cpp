@@ -30,7 +30,7 @@ auto reads_of(const TestServer& server) {
     const auto all = server.requests();
     return std::ranges::count_if(all, reads_block);
 }
-bool told(Bench& bench, std::uint64_t request) {
+bool answered(Bench& bench, std::uint64_t request) {
     return bench.eventually([&] { return bench.shaker->psd().request == request; });
 }
 
@@ -45,7 +45,7 @@ TEST(ShakerPsd, IsReadInPartsAndWhole) {
     EXPECT_EQ(reads_of(server), 0) << "nobody has asked";
     const auto request = bench.shaker->read_psd();
     ASSERT_GT(request, 0U);
-    ASSERT_TRUE(told(bench, request));
+    ASSERT_TRUE(answered(bench, request));
     const ShakerPsd psd = bench.shaker->psd();
     EXPECT_EQ(psd.why_not, "");
     ASSERT_EQ(psd.pairs.size(), 100U);
@@ -84,7 +84,7 @@ TEST(ShakerPsd, OneThatIsRefusedIsTriedAsOftenAsStated) {
     });
     Bench bench(with_block(server));
     const auto request = bench.shaker->read_psd();
-    ASSERT_TRUE(told(bench, request));
+    ASSERT_TRUE(answered(bench, request));
     EXPECT_TRUE(bench.shaker->psd().pairs.empty());
     EXPECT_NE(bench.shaker->psd().why_not.find("reading 124 registers from 40"), std::string::npos)
         << bench.shaker->psd().why_not;
@@ -106,7 +106,7 @@ TEST(ShakerPsd, SilenceEndsInHalfAFeedsPeriod) {
     ASSERT_TRUE(bench.reaches(LinkState::running));
     const auto from = std::chrono::steady_clock::now();
     const auto request = bench.shaker->read_psd();
-    ASSERT_TRUE(told(bench, request));
+    ASSERT_TRUE(answered(bench, request));
     // Twice 0.2 s, not twice the 5 s of a response; what is left is a busy machine's.
     EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(3));
     EXPECT_NE(bench.shaker->psd().why_not, "");

@@ -39,7 +39,7 @@ TEST(ShakerReadOnly, NothingIsWrittenAndAllIsRead) {
     EXPECT_TRUE(bench.eventually([&] { return writes(server) > before; }));
 }
 
-TEST(ShakerReadOnly, ALinkThatIsMadeMeanwhileIsToldNoTimeout) {
+TEST(ShakerReadOnly, ALinkThatIsMadeMeanwhileIsGivenNoTimeout) {
     TestServer server;
     auto settings = settings_for(server);
     Bench bench(settings);

@@ -153,7 +153,7 @@ TEST(Shaker, ComesDownWhateverTheFrequency) {
     server.script([](const Request& request) {
         return request.writes(kFrequency) ? Answer{Kind::exception, 3, {}} : Answer{};
     });
-    // WHEN it is told to come down, with a frequency that is not the present one
+    // WHEN it is commanded to come down, with a frequency that is not the present one
     server.forget();
     ASSERT_TRUE(bench.apply({20.0, 0.0, 1.0}));
     // THEN it does
@@ -178,7 +178,7 @@ TEST(Shaker, DoesNotStartAgainADeviceThatTrippedWhileItRan) {
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.apply({15.0, 1.0, 1.0}));
     server.forget();
-    // GIVEN a device that drops its run register while it is told the next amplitude
+    // GIVEN a device that drops its run register while the next amplitude is written
     server.script([](const Request& request) {
         return request.writes(kRampTime) ? Answer{Kind::trip, 0, {}} : Answer{};
     });

@@ -66,7 +66,7 @@ struct Answer {
 };
 
 /// A shaker controller on libmodbus' server side, with the default register map: TCP on a free port
-/// of the loopback, or a serial line on a pty. It can be told to misbehave.
+/// of the loopback, or a serial line on a pty. It can be made to misbehave.
 class TestServer {
   public:
     using Script = std::function<Answer(const Request&)>;
