@@ -77,15 +77,16 @@ void Campaign::conclude_opening(Time now) {
     const auto verdict = opening_->check().judge(zero_g);
     const bool alone = opens_alone();
     leave_stage();
-    if (!verdict.told.empty()) ports_.log.event(Severity::alarm, "opening check: " + verdict.told);
+    if (!verdict.warned.empty())
+        ports_.log.event(Severity::alarm, "opening check: " + verdict.warned);
     const auto refused = verdict.refused + "; " + verdict.suspects_text();
     if (verdict.refused.empty())
         ports_.log.event(Severity::info, "opening check: the rig is what its configuration says");
     if (alone) {
         if (!verdict.refused.empty())
             ports_.log.event(Severity::alarm, "opening check: " + refused);
-        const auto more = verdict.told +
-                          (verdict.told.empty() || verdict.apart.empty() ? "" : "; ") +
+        const auto more = verdict.warned +
+                          (verdict.warned.empty() || verdict.apart.empty() ? "" : "; ") +
                           verdict.apart;
         return conclude_rest_check(verdict.refused, more, verdict.suspects, now);
     }
@@ -97,10 +98,10 @@ void Campaign::conclude_opening(Time now) {
     start_position(now);
 }
 
-void Campaign::conclude_rest_check(const std::string& refused, const std::string& told,
+void Campaign::conclude_rest_check(const std::string& refused, const std::string& warned,
                                    const std::vector<std::string>& suspects, Time now) {
-    rest_check_.verdict = !refused.empty() ? "refused" : !told.empty() ? "told" : "right";
-    rest_check_.message = refused + (refused.empty() || told.empty() ? "" : "; ") + told;
+    rest_check_.verdict = !refused.empty() ? "refused" : !warned.empty() ? "told" : "right";
+    rest_check_.message = refused + (refused.empty() || warned.empty() ? "" : "; ") + warned;
     rest_check_.suspects = suspects;
     rest_check_.utc_ns = utc_ns();
     reason_.clear();

@@ -113,21 +113,22 @@ OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
     std::vector<room::DwellMean> means;
     for (const Stood& stood : stops_) means.push_back(mean_of(stood.seconds, stood.stop.drifts));
     const auto found = room::hold_at_rest(rig, means, limits);
-    Verdict verdict{in_one(found.refused), in_one(found.told), {}, {}};
-    if (found.refused.empty()) {  // what would do away with what is told
-        limits.refused_deg = limits.told_deg;
-        limits.refused_deg_h = limits.told_deg_h;
-        limits.refused_vertical_deg_h = limits.told_vertical_deg_h;
+    Verdict verdict{in_one(found.refused), in_one(found.warned), {}, {}};
+    if (found.refused.empty()) {  // what would do away with what is warned of
+        limits.refused_deg = limits.warn_deg;
+        limits.refused_deg_h = limits.warn_deg_h;
+        limits.refused_vertical_deg_h = limits.warn_vertical_deg_h;
     }
-    if (!found.refused.empty() || !found.told.empty()) {
+    if (!found.refused.empty() || !found.warned.empty()) {
         const auto suspects = room::suspects_at_rest(rig, means, limits);
         for (const auto& suspect : suspects) verdict.suspects.push_back(suspect.words);
         verdict.apart = room::told_apart_words(rig, suspects);
     }
     if (!found.earth_known)
-        verdict.told += std::string(verdict.told.empty() ? "" : "; ") +
-                        "the travel leaves fewer than three free drifts: nothing is said of north "
-                        "and latitude";
+        verdict.warned +=
+            std::string(verdict.warned.empty() ? "" : "; ") +
+            "the travel leaves fewer than three free drifts: nothing is said of north "
+            "and latitude";
     return verdict;
 }
 

@@ -35,8 +35,8 @@ class OpeningCheck {
     [[nodiscard]] bool next();
 
     struct Verdict {
-        std::string refused, told;  ///< empty: nothing is
-        /// Of what is refused, or else told: keys that alone, changed, would explain it, best
+        std::string refused, warned;  ///< empty: nothing is
+        /// Keys that alone, changed, would explain what is refused, or else warned of, best
         /// first.
         std::vector<std::string> suspects;
         std::string apart;  ///< which position tells the first two of them apart; empty: no matter

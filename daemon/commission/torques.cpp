@@ -169,12 +169,12 @@ void Procedure::take_torques(const room::TorqueFinding& f) {
     tell(fmt::format("G  torques X Y Z turn platform {}, scale {:+.3f} {:+.3f} {:+.3f} +- {:.3f}",
                      axes_of(f), f.sign[0] * f.scale[0], f.sign[1] * f.scale[1],
                      f.sign[2] * f.scale[2], f.sigma));
-    for (const auto& odd : f.told) tell("   " + odd);
+    for (const auto& odd : f.warnings) tell("   " + odd);
     finding_.evidence["torquers"] = {{"sign", f.sign},
                                      {"scale", f.scale},
                                      {"axes", axes_of(f)},
                                      {"turn_arcmin", f.turn_arcmin},
-                                     {"told", f.told}};
+                                     {"told", f.warnings}};
     finding_.sigma["torquer_scale"] = f.sigma;
     for (std::size_t k = 0; k < 3; ++k)
         if (const auto turns = static_cast<std::size_t>(f.axis[k]); turns != k)

@@ -11,7 +11,7 @@ namespace vibrig::tool {
 /// count too.
 [[nodiscard]] int exit_status(estimator::uncertainty::Level level, bool strict);
 
-/// A result for people: the 30 coefficients, the amplitudes, what could not be told apart, the
+/// A result for people: the 30 coefficients, the amplitudes, what could not be separated, the
 /// verdict, warnings.
 [[nodiscard]] std::string result_table(const estimator::Result& result,
                                        const estimator::uncertainty::Assessment& assessed);

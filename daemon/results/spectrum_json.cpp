@@ -83,13 +83,13 @@ Json flat_json(const Flatness& flat) {
             {"smallest_share_seen", std::move(seen)}};
 }
 
-Json told_json(const Told& told) {
-    return {{"hz", told.hz.mean},
-            {"hz_interval", {told.hz.low, told.hz.high}},
-            {"damping", told.damping.mean},
-            {"damping_interval", {told.damping.low, told.damping.high}},
-            {"elastic", numbers_or_null(told.elastic)},
-            {"sigma", numbers_or_null(told.sigma)}};
+Json estimate_json(const ResonanceEstimate& estimate) {
+    return {{"hz", estimate.hz.mean},
+            {"hz_interval", {estimate.hz.low, estimate.hz.high}},
+            {"damping", estimate.damping.mean},
+            {"damping_interval", {estimate.damping.low, estimate.damping.high}},
+            {"elastic", numbers_or_null(estimate.elastic)},
+            {"sigma", numbers_or_null(estimate.sigma)}};
 }
 
 /// One resonance as itself, two as a list, none as null.
@@ -126,7 +126,7 @@ Json effects_json(const std::vector<Effect>& effects) {
     return list;
 }
 
-/// Rates of the dwells held out, those foretold for what happened in them, deg/h, and what is
+/// Rates of the dwells held out, those predicted for what happened in them, deg/h, and what is
 /// between the two in standard uncertainties of both.
 Json held_out_json(const SpectrumResult& of) {
     Json list = Json::array();
@@ -144,18 +144,18 @@ Json held_out_json(const SpectrumResult& of) {
         variances.push_back(row.variance);
         errors.push_back(row.relative_error);
     }
-    const Prediction foretold = predict(of.analysis.model, situations);
-    const Verification verified = verify(foretold, rates, variances, errors);
+    const Prediction predicted = predict(of.analysis.model, situations);
+    const Verification verified = verify(predicted, rates, variances, errors);
     for (Index k = 0; k < rates.rows(); ++k) {
         const auto& [row, kind] = of.held_out[static_cast<std::size_t>(k)];
         VectorXd u(3);
-        for (Index j = 0; j < 3; ++j) u[j] = foretold.u(k, j);
+        for (Index j = 0; j < 3; ++j) u[j] = predicted.u(k, j);
         list.push_back({{"run", row.run},
                         {"position", row.position},
                         {"hz", kind.hz()},
                         {"profile", text_or_null(kind.profile)},
                         {"rate", numbers_or_null(row.rate)},
-                        {"predicted", numbers_or_null(foretold.drift.row(k))},
+                        {"predicted", numbers_or_null(predicted.drift.row(k))},
                         {"u", numbers_or_null(u)},
                         {"z", numbers_or_null(verified.z.row(k))}});
     }
@@ -260,7 +260,7 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
     for (std::size_t j = 0; j < 3; ++j) {
         const Mixture& gyro = a.gyros[j];
         odds.push_back(of.several() ? number_or_null(gyro.log_odds) : Json(nullptr));
-        resonance.push_back(one_or_list(tell(gyro), told_json));
+        resonance.push_back(one_or_list(estimates(gyro), estimate_json));
         mixture.push_back(mixture_json(gyro.list));
         lack.push_back(of.several() ? number_or_null(a.lack_of_fit[j]) : Json(nullptr));
     }
@@ -276,7 +276,7 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
                         {"highest_hz", a.model.highest_hz},
                         {"held_out", held_out_json(of)},
                         {"refusal", text_or_null(a.model.refusal)},
-                        {"not_told", not_told()},
+                        {"not_told", not_shown()},
                         {"effects", effects_json(a.model.effects)},
                         {"platform", frame_json(a.model.frame)}};
 }

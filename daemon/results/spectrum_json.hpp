@@ -12,7 +12,7 @@ namespace vibrig::tool {
 /// were held out it has what was measured beside what the others foretell.
 void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 
-/// Of the root `spectrum` of a file of vibrig identify --json, or of a campaign's result.json, what
+/// Reads from the root `spectrum` of a file of vibrig identify --json, or of result.json, what
 /// a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
                                                     const std::string& path);

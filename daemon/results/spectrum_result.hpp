@@ -41,13 +41,14 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
 /// The kinds of random vibration by their numbers in the controller.
 using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;
 
-/// Of the random dwells whose PSD a controller told: their bands at the platform, by
+/// Bands at the platform of the random dwells whose PSD a controller reported, by
 /// DwellRow::psd, from 1.
 using PlayedBands = std::vector<std::vector<estimator::spectrum::Band>>;
 
-/// Of a campaign's rows that say with which frequency they shook, or under which of `profiles`
-/// (others are left out), those held out left aside; nothing where there are neither several kinds
-/// nor a sweep, or too few or too many rows. Sweeps without a known second are left out.
+/// Spectrum of a campaign's rows that say with which frequency they shook, or under which of
+/// `profiles` (others are left out), those held out left aside; nothing where there are neither
+/// several kinds nor a sweep, or too few or too many rows. Sweeps without a known second are left
+/// out.
 [[nodiscard]] std::optional<SpectrumResult> spectrum_of(
     const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
     estimator::spectrum::Form form = estimator::spectrum::Form::automatic,

@@ -16,7 +16,7 @@ constexpr double kExcluded = -2;
 
 }  // namespace
 
-std::span<const char* const> not_told() {
+std::span<const char* const> not_shown() {
     static constexpr std::array kStatements{
         "motion of the platform in step with the vibration is drift (coning), and in random "
         "vibration it is not seen by slow samples",
@@ -69,12 +69,12 @@ std::string spectrum_text(const SpectrumResult& of) {
                               kGyros[j], gyro.log_odds);
             continue;
         }
-        for (const Told& told : tell(gyro))
+        for (const ResonanceEstimate& one : estimates(gyro))
             text += line(
                 "gyro %s: elastic part%s, resonance at %.2f (%.2f, %.2f) Hz, damping "
                 "%.4f (%.4f, %.4f)",
-                kGyros[j], gyro.named() ? "" : " (not named)", told.hz.mean, told.hz.low,
-                told.hz.high, told.damping.mean, told.damping.low, told.damping.high);
+                kGyros[j], gyro.named() ? "" : " (not named)", one.hz.mean, one.hz.low, one.hz.high,
+                one.damping.mean, one.damping.low, one.damping.high);
     }
     if (!a.model.refusal.empty()) text += "no prediction: " + a.model.refusal + "\n";
     text += of.table.kinds().size() > 1
@@ -85,8 +85,8 @@ std::string spectrum_text(const SpectrumResult& of) {
                 : std::string(
                       "Whether they are flat was not tested: dwells at one frequency, and "
                       "what the sweeps tell of a resonance.\n");
-    text += "Not told either:";
-    for (const char* one : not_told()) text += std::string("\n  ") + one;
+    text += "Not shown either:";
+    for (const char* one : not_shown()) text += std::string("\n  ") + one;
     return text + "\n";
 }
 

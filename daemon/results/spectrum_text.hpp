@@ -10,7 +10,7 @@ namespace vibrig::tool {
 /// For people; empty with one frequency.
 [[nodiscard]] std::string spectrum_text(const SpectrumResult& spectrum);
 
-/// What a campaign of linear vibration does not tell, one statement each.
-[[nodiscard]] std::span<const char* const> not_told();
+/// What a campaign of linear vibration cannot show, one statement each.
+[[nodiscard]] std::span<const char* const> not_shown();
 
 }  // namespace vibrig::tool

@@ -45,7 +45,7 @@ class CurveCovariance {
     /// `points` phase points at steps of tau0 (s). Factors above half of the record are ignored.
     CurveCovariance(std::span<const std::size_t> factors, std::size_t points, double tau0);
 
-    /// Of AVAR at these averaging factors, (deg/h)^4, for a record without gaps. Throws
+    /// Covariance of AVAR at these averaging factors, (deg/h)^4, for a record without gaps. Throws
     /// std::out_of_range for a factor that the constructor was not given.
     [[nodiscard]] Eigen::MatrixXd of(std::span<const std::size_t> factors,
                                      const Terms& terms) const;

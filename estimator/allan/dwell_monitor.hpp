@@ -39,7 +39,8 @@ class DwellMonitor {
   public:
     explicit DwellMonitor(const DwellMonitorSettings& settings) : settings_(settings) {}
 
-    /// Of one gyro in one dwell: its octaves, and the mean of the dwell, which is not judged here.
+    /// Tests of one gyro in one dwell: its octaves, and the mean of the dwell, which is not judged
+    /// here.
     [[nodiscard]] static std::size_t tests_of(const DwellBasis& basis) {
         return basis.octaves.size() + 1;
     }
@@ -52,8 +53,8 @@ class DwellMonitor {
     /// In the units of kTermUnits, `below` two standard errors above the estimate; Q is the one of
     /// the newest dwell's level. Zeros before learn().
     [[nodiscard]] const std::array<FittedTerm, kTerms>& terms() const { return terms_; }
-    /// Of one dwell alone, by growing averaging time; `expected` stays 0. One row of the dynamic
-    /// surface (docs/theory/allan.md).
+    /// Curve of one dwell alone, by growing averaging time; `expected` stays 0. One row of the
+    /// dynamic surface (docs/theory/allan.md).
     [[nodiscard]] static std::vector<DwellPoint> curve_of(const DwellAngles& dwell);
     /// Measured, by growing averaging time; none before learn().
     [[nodiscard]] std::vector<DwellPoint> points() const;

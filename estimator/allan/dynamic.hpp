@@ -53,7 +53,7 @@ class DynamicAllan {
 
     /// True when a window is complete: then ask for row(). Allocates and throws nothing.
     [[nodiscard]] bool add(double rate) noexcept;
-    /// Of the window that ends with the newest sample. Fits, and so allocates.
+    /// Row of the window that ends with the newest sample. Fits, and so allocates.
     [[nodiscard]] WindowRow row() const;
 
     [[nodiscard]] const std::vector<std::size_t>& factors() const { return near_.factors(); }
@@ -61,7 +61,7 @@ class DynamicAllan {
     /// Factors (of tau0) and variances beyond the window; empty before sixteen windows have passed.
     [[nodiscard]] std::vector<VariancePoint> beyond() const;
     [[nodiscard]] std::uint64_t faults() const;
-    /// Of the Allan variances of one window.
+    /// Covariance of the Allan variances of one window.
     [[nodiscard]] const CurveCovariance& covariance() const { return covariance_; }
 
   private:

@@ -175,7 +175,8 @@ double lag_one(const std::vector<std::vector<double>>& parts, bool common_mean) 
     return zero > 0 ? one / zero : 0;
 }
 
-/// Exponent of the rate's spectrum at averaging factor m, not rounded, and how many points told it.
+/// Exponent of the rate's spectrum at averaging factor m, not rounded, and how many points it comes
+/// from.
 struct Exponent {
     double alpha = 0;
     double points = 0;

@@ -44,11 +44,11 @@ struct Fit {
     std::array<FittedTerm, kTerms> terms;
     SlowNoise slow;
     std::vector<NoiseModel> models;  ///< by weight, those of at least 1 %
-    /// Not empty when the ramp cannot be told from the rate random walk in this record.
+    /// Not empty when the ramp cannot be distinguished from the rate random walk in this record.
     std::string ramp_note;
     /// Best estimates, detected or not.
     [[nodiscard]] Terms values() const;
-    /// Of the slow noise, for people; empty when its kinds are detected.
+    /// The verdict on the slow noise, for people; empty when its kinds are detected.
     [[nodiscard]] std::string verdict() const;
 };
 

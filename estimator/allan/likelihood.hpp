@@ -68,7 +68,7 @@ class CurveLikelihood {
         Eigen::VectorXd difference;   ///< r
     };
     [[nodiscard]] Evaluated evaluate(const Terms& squares, bool for_step) const;
-    /// Of the deviance by ln(square) of a term, whose share of the means is `part`.
+    /// Gradient of the deviance by ln(square) of a term, whose share of the means is `part`.
     [[nodiscard]] double gradient_of(const Evaluated& here, const Terms& squares, std::size_t term,
                                      const Eigen::VectorXd& part) const;
     /// Nothing when no term is fixed and one goes to zero.

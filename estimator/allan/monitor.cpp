@@ -100,8 +100,8 @@ void StationarityMonitor::learn(const WindowRow& row) {
     const auto variance_of = [tau](double value, Term term) {
         return value * value * term_variance(term, tau);
     };
-    // In a few windows a ramp cannot be told from a walk, and a ramp varies from one to the next by
-    // nothing: it counts as the walk that does as much over a window.
+    // In a few windows a ramp cannot be distinguished from a walk, and a ramp varies from one to
+    // the next by nothing: it counts as the walk that does as much over a window.
     Terms terms = fit.values();
     double& walk = terms[static_cast<std::size_t>(Term::K)];
     double& ramp = terms[static_cast<std::size_t>(Term::R)];

@@ -35,7 +35,7 @@ class SlidingVariance {
     [[nodiscard]] double allan(std::size_t k) const noexcept;
     /// The same with the weights of `shape`. Costs one pass over the window.
     [[nodiscard]] double allan(std::size_t k, WindowShape shape) const noexcept;
-    /// Of overlapping averages about `mean`.
+    /// Variance of overlapping averages about `mean`.
     [[nodiscard]] double classical(std::size_t k, double mean) const noexcept;
     struct Tiled {
         double variance = 0;      ///< about the mean of the tiles

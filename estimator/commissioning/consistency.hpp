@@ -13,7 +13,7 @@ namespace vibrig::estimator::commissioning {
 struct DwellMean {
     std::array<double, 3> encoder_rad{};  ///< mean readings
     std::array<double, 3> slope_deg_h{};  ///< of the readings
-    /// Of the slopes, by the readings' scatter about them, (deg/h)^2; 0: not known.
+    /// Variance of the slopes, by the readings' scatter about them, (deg/h)^2; 0: not known.
     std::array<double, 3> slope_variance{};
     double begin_s = 0, duration_s = 0;  ///< on the recording's clock
     std::array<double, 3> force_g{};     ///< raw mean; of vibration only its mean is left

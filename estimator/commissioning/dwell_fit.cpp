@@ -123,7 +123,7 @@ std::vector<Verticals> verticals(const Settings& settings, const std::vector<Dwe
 
 namespace {
 
-/// Of dwells whose level is known, with an inner angle at which rates can be told.
+/// Rates of dwells whose level is known, with an inner angle at which they can be determined.
 std::vector<DwellRates> rates_of(const Settings& settings, const std::vector<DwellMean>& dwells,
                                  double time_factor, std::vector<double>& hours) {
     const Kinematics kinematics(settings);

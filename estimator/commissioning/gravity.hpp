@@ -46,7 +46,7 @@ struct GravityFinding {
 [[nodiscard]] GravityFinding find_by_gravity(const std::vector<Stop>& stops,
                                              const GravitySettings& settings = {});
 
-/// Of each unit how badly circles fit a sweep of one channel: -2 ln likelihood, lowest 0.
+/// How badly circles fit a sweep of one channel, in each unit: -2 ln likelihood, lowest 0.
 [[nodiscard]] std::vector<double> unit_scores(const std::vector<Stop>& sweep, std::size_t channel);
 
 /// A position that tells two descriptions apart, and by how much.

@@ -82,24 +82,24 @@ void hold_earth_against(const OpeningLimits& limits, Opening& o) {
                   "of the positions",
                   o.sigma_deg_h));
     const double off = std::max(std::abs(o.north_deg_h), std::abs(o.east_deg_h));
-    const double told = std::max(limits.told_deg_h, 5 * o.sigma_deg_h);
+    const double warned = std::max(limits.warn_deg_h, 5 * o.sigma_deg_h);
     const double refused = std::max(limits.refused_deg_h, 5 * o.sigma_deg_h);
-    if (!(off <= told)) {
+    if (!(off <= warned)) {
         const auto text = words(
-            "Earth rate %.2f deg/h north, %.2f deg/h east off what the site's keys say (told "
-            "beyond %.2f, refused beyond %.2f)",
-            o.north_deg_h, o.east_deg_h, told, refused);
-        (off <= refused ? o.told : o.refused).push_back(text);
+            "Earth rate %.2f deg/h north, %.2f deg/h east off what the site's keys give (warned "
+            "above %.2f, refused above %.2f)",
+            o.north_deg_h, o.east_deg_h, warned, refused);
+        (off <= refused ? o.warned : o.refused).push_back(text);
     }
     if (!(o.rest_chi2 <= limits.rest_chi2))
         o.refused.push_back(words("free drift fits no Earth rate: chi2 %.3g, %g allowed",
                                   o.rest_chi2, limits.rest_chi2));
     const double vertical = std::abs(o.vertical_deg_h);
-    if (!(vertical <= limits.told_vertical_deg_h))
-        (vertical <= limits.refused_vertical_deg_h ? o.told : o.refused)
-            .push_back(words("drift about the vertical %.1f deg/h (told beyond %g, refused beyond "
+    if (!(vertical <= limits.warn_vertical_deg_h))
+        (vertical <= limits.refused_vertical_deg_h ? o.warned : o.refused)
+            .push_back(words("drift about the vertical %.1f deg/h (warned above %g, refused above "
                              "%g): sign of site.latitude_deg?",
-                             o.vertical_deg_h, limits.told_vertical_deg_h,
+                             o.vertical_deg_h, limits.warn_vertical_deg_h,
                              limits.refused_vertical_deg_h));
 }
 
@@ -111,11 +111,11 @@ Opening hold_at_rest(const Settings& settings, const std::vector<DwellMean>& sto
     Opening o;
     for (const Verticals& v : verticals(settings, stops))
         o.gravity_deg = std::max(o.gravity_deg, v.apart_deg());
-    if (!(o.gravity_deg <= limits.told_deg))
-        (o.gravity_deg <= limits.refused_deg ? o.told : o.refused)
-            .push_back(words("mean force %.2f deg off the vertical by the encoders (told beyond "
-                             "%g, refused beyond %g)",
-                             o.gravity_deg, limits.told_deg, limits.refused_deg));
+    if (!(o.gravity_deg <= limits.warn_deg))
+        (o.gravity_deg <= limits.refused_deg ? o.warned : o.refused)
+            .push_back(words("mean force %.2f deg off the vertical by the encoders (warned above "
+                             "%g, refused above %g)",
+                             o.gravity_deg, limits.warn_deg, limits.refused_deg));
     const RestFit fit = fit_rest(settings, stops, limits.rate_sigma, kAnyEarth, kAnyDrift, 1);
     if (fit.drifts < 3) return o;
     o.earth_known = true;

@@ -59,8 +59,8 @@ struct Description {
 /// axes (8), end of the outer axis (2), parity (2). The second half has the other parity.
 [[nodiscard]] std::vector<Description> family_of(const Description& one);
 
-/// Of a family, with the parity of `one`: counted about the end with encoder_sign[0] = 1, and the
-/// accelerometers named as the bus names them as far as that goes.
+/// The preferred one of a family, with the parity of `one`: counted about the end with
+/// encoder_sign[0] = 1, and the accelerometers named as the bus names them as far as that goes.
 [[nodiscard]] Description preferred_of(const Description& one);
 
 }  // namespace vibrig::estimator::commissioning

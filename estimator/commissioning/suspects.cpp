@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kForceSigma_g = 3e-3;
 /// Linear drift terms are believed to be about so large, deg/h/g: what the sign of the latitude is
-/// told by.
+/// recognised by.
 constexpr double kLinearSigma = 2, kEarthFixed = 1e-3;
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 

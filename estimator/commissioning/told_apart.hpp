@@ -21,7 +21,7 @@ struct ToldApart {
 /// drift terms may hide, the vertical Earth rate, counts as the same.
 [[nodiscard]] std::optional<ToldApart> told_apart(const Settings& settings, const Suspect& a,
                                                   const Suspect& b);
-/// Of the two best of a list; empty: there are no two, or no such position.
+/// For the two best of a list; empty: there are no two, or no such position.
 [[nodiscard]] std::string told_apart_words(const Settings& settings,
                                            const std::vector<Suspect>& suspects);
 

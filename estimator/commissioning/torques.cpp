@@ -56,11 +56,11 @@ Ways sorted(const Description& d, const EarthRate& rate, const std::vector<Torqu
     return ways;
 }
 
-/// Why a torquer does not do what it is told; empty: it does.
+/// Why a torquer does not do what is commanded; empty: it does.
 std::string doubt_of(std::size_t k, const Vector3d& up, const Vector3d& down, double command,
                      double sigma, const TorqueSettings& settings) {
     const double one = up.norm(), other = down.norm(), least = 5 * sigma;
-    if (std::max(one, other) < std::max(least, settings.told_scale))
+    if (std::max(one, other) < std::max(least, settings.warn_scale))
         return words("torque command %c turns nothing: %.2f +- %.2f deg/h for %.0f commanded",
                      kCommand[k], std::max(one, other) * command, sigma * command, command);
     const auto within = [&settings](double scale) {
@@ -148,13 +148,13 @@ TorqueFinding find_by_torque(const Description& description, const EarthRate& ra
     if (!f.why.empty()) return f;
     f.verdict = Verdict::decided;
     for (std::size_t k = 0; k < 3; ++k)
-        if (std::abs(f.scale[k] - 1) > settings.told_scale)
-            f.told.push_back(
+        if (std::abs(f.scale[k] - 1) > settings.warn_scale)
+            f.warnings.push_back(
                 words("torque command %c: the platform turns by %.3f of what is "
                       "commanded",
                       kCommand[k], f.scale[k]));
-    if (std::abs(f.turn_arcmin) > settings.told_turn_arcmin)
-        f.told.push_back(
+    if (std::abs(f.turn_arcmin) > settings.warn_turn_arcmin)
+        f.warnings.push_back(
             words("gyros against accelerometers: %.0f' about z; the azimuth zero is "
                   "the torquers'",
                   f.turn_arcmin));

@@ -16,8 +16,8 @@ struct Torqued {
 struct TorqueSettings {
     double rate_sigma = 0.08;           ///< of one rate, deg/h
     double factor = 2;                  ///< of rate over command: beyond it is refused
-    double told_scale = 0.05;           ///< off 1
-    double told_turn_arcmin = 10;       ///< about the azimuth axis, of gyros against accelerometers
+    double warn_scale = 0.05;           ///< off 1
+    double warn_turn_arcmin = 10;       ///< about the azimuth axis, of gyros against accelerometers
     double turn_deg = 5, skew_deg = 1;  ///< beyond these no description fits
 };
 
@@ -31,7 +31,7 @@ struct TorqueFinding {
     std::array<int, 3> sign{1, 1, 1};     ///< of the rate over the command
     Vec3 scale{};                         ///< its size
     double turn_arcmin = 0;               ///< of the torquers' axes about platform z
-    std::vector<std::string> told;        ///< accepted, but odd
+    std::vector<std::string> warnings;    ///< accepted, but odd
     /// As given, its platform axes turned about z to the torquers'.
     Description description;
     /// Each command turns the axis of its own name.

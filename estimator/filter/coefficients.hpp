@@ -8,7 +8,7 @@ namespace vibrig::estimator {
 
 inline constexpr std::size_t kGyros = 3;
 
-/// Of a gyro: input, output, spin.
+/// Axes of a gyro: input, output, spin.
 enum GyroAxis : std::size_t { kInput, kOutput, kSpin };
 
 /// What one of a gyro's coefficients multiplies: along `p` and `q` the specific force (order 2:

@@ -82,7 +82,8 @@ enum class Misfit : std::uint8_t {
     gyro_noise
 };
 inline constexpr std::size_t kMisfits = 18;
-/// Of the structural ones, up to the cubic term: as the verdict names them, and as they are freed.
+/// Names of the structural ones, up to the cubic term: as the verdict names them, and as they are
+/// freed.
 inline constexpr std::array<const char*, 10> kStructuralNames{"cross-axis",
                                                               "azimuth",
                                                               "latitude",

@@ -20,7 +20,7 @@ class DriftModel {
     /// `moment`: mean of f f', platform axes, g^2.
     [[nodiscard]] Regressors regressors(const Eigen::Vector3d& up,
                                         const Eigen::Matrix3d& moment) const noexcept;
-    /// Of a vibration along the vertical.
+    /// Regressors of a vibration along the vertical.
     [[nodiscard]] Regressors regressors(const Eigen::Vector3d& up, double kappa) const noexcept {
         return regressors(up, kappa * up * up.transpose());
     }

@@ -22,7 +22,7 @@ inline constexpr double kMaxInnerAngleRad = 80.0 * kRadPerDeg;
 /// far the base's north axis points up.
 [[nodiscard]] Eigen::Matrix3d level_reference(const SignedAxis& up, double elevation_rad) noexcept;
 
-/// Of the Earth, deg/h, reference frame.
+/// Rate of the Earth, deg/h, reference frame.
 [[nodiscard]] Eigen::Vector3d earth_rate_reference(const Eigen::Matrix3d& level,
                                                    double latitude_rad,
                                                    double azimuth_rad) noexcept;

@@ -7,7 +7,7 @@
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator {
-/// Of all coefficients, filter order, deg/h units.
+/// Covariance of all coefficients, filter order, deg/h units.
 using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 }  // namespace vibrig::estimator
 
@@ -20,7 +20,7 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 using MatrixIn = const Eigen::Ref<const Matrix>&;
 
-/// Of a symmetric matrix; its lower triangle is read.
+/// Eigenvalues and eigenvectors of a symmetric matrix, whose lower triangle is read.
 struct SymmetricEigen {
     Vector values;   ///< ascending
     Matrix vectors;  ///< one a column
@@ -57,7 +57,7 @@ class Cholesky {
     Matrix lower_;
 };
 
-/// Of a symmetric positive definite matrix; NaN if it is none.
+/// Inverse of a symmetric positive definite matrix; NaN if it is none.
 [[nodiscard]] Matrix positive_inverse(MatrixIn a);
 /// d' covariance^-1 d; likewise.
 [[nodiscard]] double squared_distance(MatrixIn covariance, const Vector& d);
@@ -68,7 +68,7 @@ class Cholesky {
 /// The same, no triangle, where some inputs may have no variance at all: their rows are zero.
 [[nodiscard]] Matrix semidefinite_root(MatrixIn a);
 
-/// Of a symmetric matrix that rounding may have made indefinite: A = P' L D L' P, pivoted.
+/// Factors of a symmetric matrix that rounding may have made indefinite: A = P' L D L' P, pivoted.
 class PivotedCholesky {
   public:
     explicit PivotedCholesky(MatrixIn a);
@@ -82,7 +82,7 @@ class PivotedCholesky {
     std::unique_ptr<Factor> factor_;
 };
 
-/// Of a square matrix that may be indefinite: P A = L U.
+/// Factors of a square matrix that may be indefinite: P A = L U.
 class LowerUpper {
   public:
     explicit LowerUpper(MatrixIn a);
@@ -106,13 +106,14 @@ class LowerUpper {
 /// A' A.
 [[nodiscard]] Matrix gram(MatrixIn a);
 
-/// Of all 30 coefficients, without allocation: the estimator's thread asks for these.
+/// Eigenvalues and eigenvectors of the covariance of all 30 coefficients, without allocation: the
+/// estimator's thread asks for these.
 struct CovarianceEigen {
     Eigen::Matrix<double, kParameters, 1> values;  ///< ascending
     Covariance vectors;
 };
 [[nodiscard]] CovarianceEigen covariance_eigen(const Covariance& a) noexcept;
-/// Of a symmetric positive definite matrix; NaN if it is none.
+/// Inverse of a symmetric positive definite matrix; NaN if it is none.
 [[nodiscard]] Covariance covariance_inverse(const Covariance& a) noexcept;
 
 }  // namespace vibrig::estimator::linear_algebra

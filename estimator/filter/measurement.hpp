@@ -24,7 +24,7 @@ struct RandomVibration {
     double bandwidth_hz = 0;    ///< square of the PSD's integral over the integral of its square
     double gain_error = 0;      ///< of the mean square that was played, relative, 1 sigma
     double highest_hz = 0;      ///< up to which there is any power
-    std::uint16_t profile = 0;  ///< its number in the controller; 0: not said
+    std::uint16_t profile = 0;  ///< its number in the controller; 0: not reported
     double level_db = 0;        ///< of what was played about the profile
 };
 

@@ -11,7 +11,7 @@ namespace {
 constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
 constexpr double kRejectedTolerance = 0.01;  ///< of the samples
 constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
-/// The same, followed but told: above what an amplitude held within 0.3 % does, below one that
+/// The same, followed but reported: above what an amplitude held within 0.3 % does, below one that
 /// drifts by 2 %. With more readings missing than this share the level itself is not so sure.
 constexpr double kLevelDrift = 0.025;
 constexpr double kMostFilled = 0.05;
@@ -81,12 +81,12 @@ void DwellRecord::note_interval(double periods) noexcept {
     if (periods >= kCrowdedFrom && periods < kCrowdedTo) ++crowded;
 }
 
-/// In place of what a sine's level says.
+/// In place of a sine's level.
 RandomLevel::Level take_random_level(const DwellRecord& r, const Settings& settings,
                                      DwellSummary& s) noexcept {
-    const bool told = r.played && r.played->word == PlayedRandom::Word::good;
-    RandomVibration shown = told ? r.played->random : r.info.random;
-    const Seen seen = told ? r.played->seen : r.seen;
+    const bool reported = r.played && r.played->word == PlayedRandom::Word::good;
+    RandomVibration shown = reported ? r.played->random : r.info.random;
+    const Seen seen = reported ? r.played->seen : r.seen;
     shown.mean_square_g2 *= seen.share;
     const auto level = r.random_level.level(shown, settings.accelerometer_g, r.period_s, r.span_s);
     s.kappa = 1 + level.mean_square_g2 / seen.share;

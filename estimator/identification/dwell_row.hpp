@@ -30,14 +30,15 @@ struct DwellRow {
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< y, deg/h
     Eigen::Matrix3d variance = Eigen::Matrix3d::Zero();
     Regression regressors = Regression::Zero();  ///< h as it weighs in `rate`
-    /// Of the drift within the dwell, deg/h per 100 s, the mean left free.
+    /// Ramp of the drift within the dwell, deg/h per 100 s, the mean left free.
     Eigen::Vector3d ramp = Eigen::Vector3d::Zero();
     Eigen::Matrix3d ramp_variance = Eigen::Matrix3d::Zero();
     Regression ramp_regressors = Regression::Zero();
     double nis_per_dof = 0, innovation_correlation = 0;
     std::uint32_t used = 0;
     double sync_arcsec = 0;  ///< motion of the angles in step with the vibration
-    /// Of the vibration's mean square, as the accelerometers show it: harmonics of frequency_hz.
+    /// Shares of the vibration's mean square, as the accelerometers show it: harmonics of
+    /// frequency_hz.
     Harmonics::Shares harmonics{};
     bool flagged = false;       ///< and not merely followed
     double commanded_hz = 0;    ///< 0: nobody said

@@ -72,7 +72,7 @@ class Identification {
     /// What was played in the random dwell that ended last, its summary once more with that: its
     /// row has the PSD's level in place of its profile's, may fall or rise again. After everything
     /// else that an end of a dwell brings about, so that a campaign comes out alike live, resumed
-    /// and replayed. Nothing where the last dwell was no random one, or is told of already.
+    /// and replayed. Nothing where the last dwell was no random one, or has had it already.
     DwellSummary played(const PlayedRandom& played) noexcept;
     /// By the filter: each D_F as it is now, after its walk from dwell to dwell.
     void estimate(Estimate& out) const noexcept;
@@ -86,8 +86,8 @@ class Identification {
     [[nodiscard]] Result result() const;
     /// Those of result() and, in their order, those apart from them.
     [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
-    /// Of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not they are
-    /// observable. Allocates.
+    /// Covariance of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not
+    /// they are observable. Allocates.
     [[nodiscard]] std::vector<double> covariance() const;
     /// The same of estimate(); between dwells only.
     [[nodiscard]] std::vector<double> covariance_now() const;

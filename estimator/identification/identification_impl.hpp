@@ -131,7 +131,8 @@ struct Identification::Impl {
     bool random_ = false;  ///< likewise
     bool swept_ = false;   ///< likewise: the filter is left alone
     bool primed_ = false;  ///< the level of this stretch is known
-    /// Of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter yet.
+    /// Variance of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter
+    /// yet.
     std::optional<double> walked_;
     double walk_begin_s_ = 0;  ///< of this dwell's readings, on the dwells' clock if there is one
     /// The dwell kept last: its readings begin and last so long.

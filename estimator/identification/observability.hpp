@@ -17,8 +17,8 @@ struct KappaSpread {
     std::size_t dwells = 0;
 
     void add(double kappa) noexcept;
-    /// All within 2 % of their mean: the squares cannot be told from the constant, whatever the
-    /// covariance says.
+    /// All within 2 % of their mean: the squares cannot be distinguished from the constant,
+    /// whatever the covariance says.
     [[nodiscard]] bool one_level() const noexcept;
 };
 

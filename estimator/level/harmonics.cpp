@@ -15,16 +15,16 @@ constexpr double kLeast = 1e-4;
 
 }  // namespace
 
-std::size_t Harmonics::told(double period_s) const noexcept {
+std::size_t Harmonics::reported(double period_s) const noexcept {
     std::size_t n = 0;
-    while (n < kTold && static_cast<double>(n + 2) * hz_ * period_s < kHighest) ++n;
+    while (n < kReported && static_cast<double>(n + 2) * hz_ * period_s < kHighest) ++n;
     return n;
 }
 
 void Harmonics::begin(double hz, double period_s) noexcept {
     *this = {};
     hz_ = hz;
-    const std::size_t n = hz > 0 ? told(period_s) : 0;
+    const std::size_t n = hz > 0 ? reported(period_s) : 0;
     lines_ = n > 0 ? n + 1 : 0;
 }
 
@@ -63,7 +63,7 @@ void Harmonics::close() noexcept {
 
 Harmonics::Shares Harmonics::shares(double period_s) const noexcept {
     Shares out{};
-    const std::size_t n = std::min(told(period_s), lines_ > 0 ? lines_ - 1 : 0);
+    const std::size_t n = std::min(reported(period_s), lines_ > 0 ? lines_ - 1 : 0);
     double all = power_[0];
     for (std::size_t k = 0; k < n; ++k) all += power_[k + 1];
     if (!(all > 0)) return out;

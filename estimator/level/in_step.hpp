@@ -12,7 +12,7 @@ namespace vibrig::estimator {
 /// how much of it goes across. Of a few seconds at a steady level.
 struct InStep {
     double platform_g = 0;  ///< along the vertical, peak, as the accelerometers show it; 0: unknown
-    /// Of the gimbals outer, inner, azimuth, peak, arcsec, noise and all.
+    /// Motion of the gimbals outer, inner, azimuth, peak, arcsec, noise and all.
     std::array<double, 3> gimbal_arcsec{};
     /// Per g of platform_g: the turn of the platform against its base, peak, which is the same at
     /// every position, noise's share taken out; and what noise does to the in-phase and quadrature
@@ -37,10 +37,10 @@ struct Growth {
     double times = 0;     ///< what is found now, over that: beyond kGrown it has grown
     static constexpr double kGrown = 3;
 };
-/// Of the motion per g of vibration: never beyond kGrown by chance but once in 1e9.
+/// Growth of the motion per g of vibration: never beyond kGrown by chance but once in 1e9.
 [[nodiscard]] Growth motion_growth(const InStep& before, const InStep& now);
-/// Of the cross share; the allowance has in it what `settings` declare of accelerometers: zeros,
-/// gains at one frequency, skew.
+/// Growth of the cross share; the allowance has in it what `settings` declare of accelerometers:
+/// zeros, gains at one frequency, skew.
 [[nodiscard]] Growth cross_growth(const InStep& before, const InStep& now, double hz,
                                   const Settings& settings);
 

@@ -6,11 +6,12 @@
 
 namespace vibrig::estimator {
 
-/// Tells an accelerometer that stops at the end of its range from one that turns round there: noise
-/// spreads the crests of a vibration over neighbouring values, while a saturated one shows its
-/// highest or lowest value again and again. One dwell at a time. Without a known range nothing is
-/// told of a converter whose steps are as large as the noise, which repeats itself everywhere, of
-/// noise added after the saturation, and of an axis with a single wild reading beyond the end.
+/// Distinguishes an accelerometer that stops at the end of its range from one that turns round
+/// there: noise spreads the crests of a vibration over neighbouring values, while a saturated one
+/// shows its highest or lowest value again and again. One dwell at a time. Without a known range
+/// nothing is reported of a converter whose steps are as large as the noise, which repeats itself
+/// everywhere, of noise added after the saturation, and of an axis with a single wild reading
+/// beyond the end.
 class SaturationDetector {
   public:
     /// `noise_g`: 1 sigma of one reading. `range_g`: readings of this size are saturated; 0: not

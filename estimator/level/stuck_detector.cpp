@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kChance = 1e-15;  ///< of a working resolver being taken for a stuck one
 constexpr double kFewest = 20;
-constexpr double kHighestChance = 0.5;  ///< of two equal readings; above it nothing is told
+constexpr double kHighestChance = 0.5;  ///< of two equal readings; above it nothing is reported
 
 }  // namespace
 

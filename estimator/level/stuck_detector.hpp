@@ -8,9 +8,10 @@
 
 namespace vibrig::estimator {
 
-/// Tells a resolver that shows one value for ever from one that is quiet: noise moves the last bits
-/// of a working one all the time. Where all three stand still nothing is told: that is a source
-/// without noise, or one whose samples do not come any more, which is not this class's business.
+/// Distinguishes a resolver that shows one value for ever from one that is quiet: noise moves the
+/// last bits of a working one all the time. Where all three stand still nothing is reported: that
+/// is a source without noise, or one whose samples do not come any more, which is not this class's
+/// business.
 class StuckDetector {
   public:
     explicit StuckDetector(const Settings& settings) noexcept;

@@ -14,12 +14,12 @@ class SyncMotion {
   public:
     explicit SyncMotion(double nominal_hz);
     void clear() noexcept;
-    /// Of the vibration to come; after clear().
+    /// Frequency of the vibration to come; after clear().
     void nominal(double hz) noexcept { nominal_hz_ = hz; }
     /// One reading, time from the beginning of the dwell.
     void add(double time_s, const std::array<double, 3>& innovation_arcsec) noexcept;
-    /// Of the three axes together, arcsec; `variance`: of one innovation, arcsec^2, whose share is
-    /// taken out.
+    /// Amplitude of the three axes together, arcsec; `variance`: of one innovation, arcsec^2, whose
+    /// share is taken out.
     [[nodiscard]] double amplitude_arcsec(double frequency_hz, double variance) const noexcept;
     /// The same axis by axis: what goes with the cosine and against the sine of the vibration's
     /// phase from time 0, peak, arcsec, noise and all; white noise of variance 1 leaves

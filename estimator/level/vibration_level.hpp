@@ -21,7 +21,7 @@ class VibrationLevel {
 
     VibrationLevel(double window_s, double noise_g, double nominal_hz);
 
-    /// Of the vibration to come; before begin().
+    /// Frequency of the vibration to come; before begin().
     void nominal(double hz) noexcept { nominal_hz_ = hz; }
     /// A new stretch of data begins.
     void begin(double period_s) noexcept;

@@ -80,7 +80,7 @@ class Leveller {
     [[nodiscard]] const FastNetwork& axis(std::size_t i) const noexcept { return axis_[i]; }
     [[nodiscard]] const NoiseBudget& budget() const noexcept { return budget_; }
     [[nodiscard]] double tolerance() const noexcept { return tolerance_; }  ///< rad
-    /// Of the second observable, whose noise is larger where the reference is noisy; rad.
+    /// Tolerance of the second observable, whose noise is larger where the reference is noisy; rad.
     [[nodiscard]] double rate_tolerance() const noexcept { return rate_tolerance_; }
     /// 1 sigma of the observables once the loop is steady, rad. The first is that of the tilt
     /// together with what is left of the accelerometers' in the mean over the window.
@@ -125,7 +125,7 @@ class Leveller {
     [[nodiscard]] LevelOutput limited(Pair rate) noexcept;
 
     LevellerSettings settings_;
-    /// Of an observable that was outside its band.
+    /// An observable that was outside its band.
     struct Outside {
         const char* what = "mean specific force";
         std::size_t channel = 0;

@@ -18,7 +18,7 @@ struct NoiseBudget {
     double gyro = 0;
     double total = 0;
     double drift = 0;  ///< of the drift that z shows, rad/s
-    /// Of w without the white part that the newest reference velocity is in it, m/s.
+    /// Sigma of w without the white part that the newest reference velocity is in it, m/s.
     double velocity = 0;
 
     [[nodiscard]] const char* dominant() const noexcept;

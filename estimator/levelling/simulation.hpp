@@ -29,7 +29,8 @@ struct Scenario {
     Pair zero{};                   ///< of the accelerometers, m/s^2
     Pair reference_error{};        ///< constant, m/s
     double reference_error_s = 0;  ///< from then on; the loop begins at the reference
-    /// Of the network less the reference at first, m/s; Network::fast begins at the reference.
+    /// Velocity of the network less the reference at first, m/s; Network::fast begins at the
+    /// reference.
     Pair start_velocity{};
     double step_s = -1;  ///< when the platform tips; negative: never
     Pair step{};         ///< by how much, rad

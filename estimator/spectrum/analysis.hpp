@@ -32,7 +32,7 @@ struct Analysis {
     Eigen::VectorXd value;
     Eigen::MatrixXd covariance_a, covariance;
 
-    /// Of some gyro a resonance is likelier than none.
+    /// For some gyro a resonance is likelier than none.
     [[nodiscard]] bool resonant() const;
 };
 

@@ -13,7 +13,7 @@ namespace vibrig::estimator::spectrum {
 /// What a random dwell's PSD at the table has to agree with.
 struct PsdExpected {
     Profile nominal;            ///< at the table, at the level that was asked for
-    double measured_g_rms = 0;  ///< by the controller, over the dwell; 0: nobody said
+    double measured_g_rms = 0;  ///< by the controller, over the dwell; 0: not reported
     double seconds = 0;         ///< of the dwell
     double gain_error = 0.01;   ///< of the mean square that is played, relative, 1 sigma
     /// As it came after the random dwell before; empty: there was none.

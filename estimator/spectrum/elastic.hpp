@@ -22,7 +22,8 @@ struct Band {
     double hz = 0, share = 1, width_hz = 0;
 };
 
-/// Of a whole vibration, less 1: what the elastic part adds to the static coefficient. At rest 0.
+/// Weight of a whole vibration, less 1: what the elastic part adds to the static coefficient. At
+/// rest 0.
 [[nodiscard]] inline double elastic_weight(std::span<const Band> bands,
                                            const Resonance& of) noexcept {
     double sum = 0;

@@ -27,7 +27,7 @@ class Exposure {
     Exposure(const Settings& settings, Situation in);
 
     [[nodiscard]] const Situation& situation() const { return in_; }
-    /// Of gyro j: the columns of base, and of the vibration's whole second moment.
+    /// Columns of gyro j: those of base, and of the vibration's whole second moment.
     [[nodiscard]] const Eigen::Matrix<double, kBase, 1>& base(std::size_t j) const {
         return at_.base[j];
     }

@@ -16,9 +16,9 @@ using Eigen::VectorXd;
 
 constexpr double kLeastSlow = 1e-3;  ///< of a slow change of the bias
 constexpr double kSeen = 1.2816;     ///< 90 % of a normal distribution
-constexpr double kDampingTold = 0.05;
+constexpr double kReportedDamping = 0.05;
 constexpr double kShare = 0.2;
-constexpr std::array<double, 5> kTold{40, 60, 120, 300, 1000};
+constexpr std::array<double, 5> kReportedAt{40, 60, 120, 300, 1000};
 
 /// Columns of three gyros, one below the other in the order of the rates.
 MatrixXd interleaved(const std::array<MatrixXd, 3>& of) {
@@ -162,7 +162,7 @@ Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
     const VectorXd value = grouped.value(y);
     const Index of_gyro = groups[0].cols();
     const auto share_seen = [&](double hz) {
-        const VectorXd weights = table.elastic_weights({hz, kDampingTold});
+        const VectorXd weights = table.elastic_weights({hz, kReportedDamping});
         VectorXd moved(rates.size());
         for (Index j = 0; j < 3; ++j) {
             const auto g = static_cast<std::size_t>(j);
@@ -172,7 +172,7 @@ Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
         }
         return std::sqrt(needed / std::max(1e-300, flat.left(whitened(moved))));
     };
-    for (const double hz : kTold) out.smallest_seen.emplace_back(hz, share_seen(hz));
+    for (const double hz : kReportedAt) out.smallest_seen.emplace_back(hz, share_seen(hz));
     for (const Kind& kind : table.kinds()) {
         for (const Band& band : kind.bands) {
             if (band.hz > out.highest_hz && share_seen(band.hz) <= kShare) out.highest_hz = band.hz;

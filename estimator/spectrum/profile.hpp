@@ -29,7 +29,7 @@ struct Profile {
     std::string name;
     Breakpoints psd;
     std::vector<std::pair<double, double>> sines;  ///< Hz and g peak
-    /// Of psd and sines; level frame: north, up, east; of length 1.
+    /// Direction of psd and sines; level frame: north, up, east; of length 1.
     Eigen::Vector3d direction{0, 1, 0};
     double g_rms = 0;   ///< as stated; 0: not
     AxesPsd axes = {};  ///< in place of psd
@@ -39,7 +39,7 @@ struct Profile {
 /// before it, such as "profile.json: ".
 void check(const Profile& profile, const std::string& path = {});
 
-/// Of the whole profile, all axes together, g^2.
+/// Mean square of the whole profile, all axes together, g^2.
 [[nodiscard]] double mean_square(const Profile& profile);
 
 /// The bands of a profile, with their shares of its mean square: so many for each decade, each with

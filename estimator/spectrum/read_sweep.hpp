@@ -19,7 +19,8 @@ class ReadSweep {
     void frequency(double time_s, double hz);
     /// Times rise. What no reading is after yet waits for one.
     void add(const Measurement& measurement);
-    /// Of all samples: those after the last reading have its frequency. None without a reading.
+    /// The sweep of all samples: those after the last reading have its frequency. None without a
+    /// reading.
     [[nodiscard]] Sweep finish();
 
     /// s since the dwell began, and Hz.

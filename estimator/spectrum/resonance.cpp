@@ -441,9 +441,9 @@ Mixture one_resonance(const SpectralTable& table, std::size_t gyro, const GyroPr
     return out;
 }
 
-std::vector<Told> tell(const Mixture& mixture) {
+std::vector<ResonanceEstimate> estimates(const Mixture& mixture) {
     const std::size_t count = mixture.list.front().resonances.size();
-    std::vector<Told> out;
+    std::vector<ResonanceEstimate> out;
     for (std::size_t r = 0; r < count; ++r) {
         const Index begin = kBase + kElastic * static_cast<Index>(r);
         double all = 0;
@@ -471,7 +471,7 @@ std::vector<Told> tell(const Mixture& mixture) {
         }
         mean /= all;
         square /= all;
-        Told told;
+        ResonanceEstimate estimate;
         const bool linearised = mixture.list.front().linearised;
         const auto spread = [linearised](double m, double s, const Interval& between) {
             const double sigma = std::sqrt(std::max(0.0, s - m * m));
@@ -480,13 +480,13 @@ std::vector<Told> tell(const Mixture& mixture) {
             const double factor = std::exp(1.96 * sigma / m);
             return Spread{m, sigma, m / factor, m * factor};
         };
-        told.hz = spread(mean[0], square[0], mixture.hz);
-        told.hz.low = std::max(told.hz.low, kLowestResonance);
-        told.hz.high = std::min(told.hz.high, kHighestResonance);
-        told.damping = spread(mean[1], square[1], mixture.damping);
-        told.elastic = value / all;
-        told.sigma = (squares / all - told.elastic.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
-        out.push_back(told);
+        estimate.hz = spread(mean[0], square[0], mixture.hz);
+        estimate.hz.low = std::max(estimate.hz.low, kLowestResonance);
+        estimate.hz.high = std::min(estimate.hz.high, kHighestResonance);
+        estimate.damping = spread(mean[1], square[1], mixture.damping);
+        estimate.elastic = value / all;
+        estimate.sigma = (squares / all - estimate.elastic.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+        out.push_back(estimate);
     }
     return out;
 }

@@ -59,10 +59,10 @@ struct Mixture {
 [[nodiscard]] Mixture two_resonances(const SpectralTable& table, std::size_t gyro,
                                      const GyroProblem& problem, double first_hz);
 
-/// Of a gyro's sweep, whitened, n x (10 + 6 m).
+/// Design matrix of a gyro's sweep, whitened, n x (10 + 6 m).
 [[nodiscard]] Eigen::MatrixXd swept_design(const SweptRates& swept,
                                            const std::vector<Resonance>& resonances);
-/// Of a gyro, n x (10 + 6 m).
+/// Design matrix of a gyro, n x (10 + 6 m).
 [[nodiscard]] Eigen::MatrixXd design(const SpectralTable& table, std::size_t gyro,
                                      const std::vector<Resonance>& resonances);
 /// x = gain * rates of a hypothesis, its resonances kept: (10 + 6 m) x n.
@@ -74,12 +74,12 @@ struct Mixture {
 struct Spread {
     double mean = 0, sigma = 0, low = 0, high = 0;
 };
-struct Told {
+struct ResonanceEstimate {
     Spread hz, damping;
     Eigen::Matrix<double, kElastic, 1> elastic, sigma;
 };
 /// One for each resonance of the likelier model.
-[[nodiscard]] std::vector<Told> tell(const Mixture& mixture);
+[[nodiscard]] std::vector<ResonanceEstimate> estimates(const Mixture& mixture);
 
 /// Prior of ln damping, and of an elastic coefficient in deg/h/g^2, half each.
 inline constexpr double kDamping = 0.05, kDampingSpread = 0.9;

@@ -18,8 +18,8 @@ struct SweepBlock {
     std::array<double, 3> angle_rad{};  ///< mean of the raw encoder angles, without wraps
     std::size_t samples = 0;            ///< of that mean
     double from_hz = 0, to_hz = 0;      ///< at its ends
-    /// Of the vibration's specific force, level frame, g^2; not finite: not known, as where a
-    /// harmonic falls on a multiple of the sampling rate.
+    /// Second moment of the vibration's specific force, level frame, g^2; not finite: not known, as
+    /// where a harmonic falls on a multiple of the sampling rate.
     Eigen::Matrix3d moment = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 

@@ -133,7 +133,7 @@ void SweepBlocks::take_moment(SweepBlock& block) {
             moving - linear_algebra::product(of, linear_algebra::least_squares(of, moving));
         shares_.push_back(1 - std::max(0.0, left.squaredNorm() / sum - 3 * noise) / power);
     }
-    // What it is told apart from is there; how large it is is not.
+    // It can be told apart from others there; its size cannot be had.
     if (!clear_of_samples(block.from_hz, block.to_hz, static_cast<double>(n) / kBlock_s)) return;
     moment -= noise * Eigen::Matrix3d::Identity();
     const double seen =

@@ -19,11 +19,11 @@ class SweepBlocks {
     static constexpr double kBlock_s = 1;
     SweepBlocks(const Settings& settings, int run, int position);
 
-    /// Times rise; `hz`: of the vibration at this moment, as the controller says.
+    /// Times rise; `hz`: of the vibration at this moment, as the controller reports it.
     void add(const Measurement& measurement, double hz);
-    /// Of all samples so far; the last second is there if it is a whole one.
+    /// The sweep of all samples so far; the last second is there if it is a whole one.
     [[nodiscard]] Sweep finish();
-    /// Of the vibration's power what goes through the frequencies that were said, median of the
+    /// Share of the vibration's power that goes through the frequencies reported, median of the
     /// blocks that shook; 1: of none. A frequency that is wrong by half a hertz, or late by half a
     /// second, leaves less than kShown.
     [[nodiscard]] double shown() const;

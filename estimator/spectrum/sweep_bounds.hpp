@@ -4,17 +4,17 @@
 
 namespace vibrig::estimator::spectrum {
 
-/// How a controller sweeps, by its own statement, and how it is told and read.
+/// How a controller sweeps, by its own statement, and how it is commanded and read.
 struct SweptBy {
     double begins_s = 8;              ///< after its level is there, at most
     double rate_tolerance = 0.05;     ///< relative
     double poll_s = 0.2;              ///< between two readings of its registers
-    double frequency_step_hz = 1e-3;  ///< of the register that says where it is
-    double rate_step = 1e-2;          ///< of that which is told its rate, octaves a minute
+    double frequency_step_hz = 1e-3;  ///< of the register of the actual frequency
+    double rate_step = 1e-2;          ///< of the register of its rate, octaves a minute
 };
 
 /// How far a sweep may be from what was asked for while all that it is read by is honest; one that
-/// is farther goes otherwise than it was told (docs/theory/spectrum.md, "How far a sweep may be
+/// is farther does not do what was commanded (docs/theory/spectrum.md, "How far a sweep may be
 /// off"). Nothing in it is chosen but what the controller states (SweptBy):
 ///
 ///  * A frequency that is off by d over a block of T seconds leaves W(d T)^2 of the power under it,

@@ -13,12 +13,12 @@ namespace vibrig::estimator::spectrum {
 /// Positions of the sweeps of a plan.
 inline constexpr std::size_t kSweptPositions = 3;
 
-/// Of a sweep's blocks (SweepBlocks::kBlock_s) those that will be known.
+/// Those of a sweep's blocks (SweepBlocks::kBlock_s) that will be known.
 struct UsableBlocks {
     std::size_t blocks = 0, known = 0;
     std::size_t rates = 0;  ///< between neighbours that are both known
 
-    /// Of the rates that the sweep would have were all of them known.
+    /// Share of the rates that the sweep would have were all of them known.
     [[nodiscard]] double share() const noexcept {
         return blocks > 1 ? static_cast<double>(rates) / static_cast<double>(blocks - 1) : 0;
     }

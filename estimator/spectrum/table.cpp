@@ -34,13 +34,13 @@ std::vector<Band> bands_of(const Settings& settings, const DwellRow& row,
     const double hz = of_kind.front().hz;
     const AccelerometerResponse& response = settings.accelerometer_response;
     std::vector<Band> out{{hz, 0, 0}};
-    double told = 0, all = 0;
+    double harmonics = 0, all = 0;
     for (std::size_t k = 0; k < row.harmonics.size(); ++k) {
         const double of = static_cast<double>(k + 2) * hz;
         if (row.harmonics[k] > 0) out.push_back({of, row.harmonics[k] / response.power(of), 0});
-        told += row.harmonics[k];
+        harmonics += row.harmonics[k];
     }
-    out.front().share = (1 - told) / response.power(hz);
+    out.front().share = (1 - harmonics) / response.power(hz);
     for (const Band& band : out) all += band.share;
     for (Band& band : out) band.share /= all;
     return out;

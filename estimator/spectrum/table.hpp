@@ -18,7 +18,7 @@ struct Kind {
     std::string profile;  ///< its name; empty: a sine, whose harmonics are bands of their own
     std::vector<Band> bands;
 
-    /// Of a sine its strongest line; of a profile the power's centre, Hz.
+    /// Strongest line of a sine, centre of the power of a profile, Hz.
     [[nodiscard]] double hz() const noexcept;
 };
 
@@ -54,7 +54,7 @@ class SpectralTable {
     /// Of gyro j: n x 10, and of the vibration's second moment alone n x 6 (II SS OO IS IO OS).
     [[nodiscard]] const Eigen::MatrixXd& base(std::size_t j) const { return base_[j]; }
     [[nodiscard]] const Eigen::MatrixXd& vibration(std::size_t j) const { return vibration_[j]; }
-    /// Of all dwells.
+    /// Weights of all dwells.
     [[nodiscard]] Eigen::VectorXd elastic_weights(const Resonance& of) const;
     /// Of gyro j, n x (4 + 6 F): six quadratic coefficients for every kind, gravity's with the
     /// first.

@@ -60,11 +60,12 @@ struct DriftAverage {
 
 [[nodiscard]] DriftAverage average_drift(const GyroRates& gyro, const Drift& drift);
 
-/// Of the rates about their model, n x n: noise, and what the bias may have done by `average`.
+/// Covariance of the rates about their model, n x n: noise, and what the bias may have done by
+/// `average`.
 [[nodiscard]] Eigen::MatrixXd mean_covariance(const GyroRates& gyro, const DriftAverage& average);
 
-/// Of a covariance with these sizes of scatter and walk over that of noise alone, for the same
-/// rates: logarithm of the likelihood ratio.
+/// Logarithm of the likelihood ratio of a covariance with these sizes of scatter and walk over that
+/// of noise alone, for the same rates.
 class DriftLikelihood {
   public:
     explicit DriftLikelihood(const GyroRates& gyro);

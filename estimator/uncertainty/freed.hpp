@@ -8,7 +8,7 @@
 
 namespace vibrig::estimator::uncertainty {
 
-/// Of a class that is freed: what the data say of one of its unknowns.
+/// What the data say of one unknown of a class that is freed.
 struct FreedUnknown {
     std::string of_class, element;
     double value = 0, sigma = 0;

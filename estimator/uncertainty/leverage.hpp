@@ -11,7 +11,7 @@ namespace vibrig::estimator::uncertainty {
 /// Bias, linear terms, squares, products.
 inline constexpr std::size_t kKinds = 4;
 [[nodiscard]] const char* kind_name(std::size_t kind) noexcept;
-/// Of a coefficient in the order of parameter_names().
+/// Kind of a coefficient in the order of parameter_names().
 [[nodiscard]] std::size_t kind_of(std::size_t coefficient) noexcept;
 
 /// What one part of the budget does to the combined uncertainties.

@@ -7,7 +7,7 @@
 
 namespace vibrig::estimator::uncertainty {
 
-/// Of fewer units nothing is said about others.
+/// From fewer units nothing is said about others.
 inline constexpr std::size_t kFewestUnits = 10;
 /// A unit that its type allows less often than this is not taken for one of it.
 inline constexpr double kOutsider = 0.01;
@@ -24,7 +24,7 @@ struct Population {
     Eigen::VectorXd mean;
     Eigen::MatrixXd between;  ///< units
     Eigen::MatrixXd within;   ///< campaigns of one unit, beyond what was measured; 0: not known
-    /// Of the truth in a campaign of another unit, as wide as so few units leave it.
+    /// Covariance of the truth in a campaign of another unit, as wide as so few units leave it.
     Eigen::MatrixXd predicted;
     double independent = 1;  ///< share of the correlations that is not believed, 0 to 1
 };

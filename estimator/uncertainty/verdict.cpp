@@ -149,24 +149,25 @@ Effect effect_of(const Assessment& a, const Eigen::VectorXd& change) {
 /// Of a pattern whose input somebody has declared to be better known than the data say.
 std::string contradiction(const Settings& settings, const Evidence& e) {
     const Inputs& in = settings.uncertainty;
-    const auto told = [](const char* key, const Declared& d, const char* unit) {
+    const auto declared = [](const char* key, const Declared& d, const char* unit) {
         return d.declared ? text(" (uncertainty.%s declares %.3g%s)", key, d.u, unit)
                           : std::string();
     };
     switch (e.pattern) {
         case Pattern::azimuth:
-            return told("azimuth_arcsec", in.azimuth_arcsec, " arcsec");
+            return declared("azimuth_arcsec", in.azimuth_arcsec, " arcsec");
         case Pattern::latitude:
-            return told("latitude_arcsec", in.latitude_arcsec, " arcsec");
+            return declared("latitude_arcsec", in.latitude_arcsec, " arcsec");
         case Pattern::time_base:
-            return told("time_base", in.time_base, "");
+            return declared("time_base", in.time_base, "");
         case Pattern::encoder_zero:
-            return told("encoder_zero_arcsec", in.encoder_zero_arcsec[strongest(e) % 3], " arcsec");
+            return declared("encoder_zero_arcsec", in.encoder_zero_arcsec[strongest(e) % 3],
+                            " arcsec");
         case Pattern::non_orthogonality:
-            return told("non_orthogonality_arcsec", in.non_orthogonality_arcsec[strongest(e) % 2],
-                        " arcsec");
+            return declared("non_orthogonality_arcsec",
+                            in.non_orthogonality_arcsec[strongest(e) % 2], " arcsec");
         case Pattern::cross_axis:
-            return told("cross_axis", in.cross_axis[strongest(e) % 2], "");
+            return declared("cross_axis", in.cross_axis[strongest(e) % 2], "");
         default:
             return {};
     }
@@ -321,11 +322,12 @@ void add_cross_check(const CrossCheck& check, std::vector<Reason>& list) {
 
 void add_order(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
     if (!(a.worst_step > kMostStep) || settings.drift.power == Power::unbroken) return;
-    list.push_back({"order",
-                    "in this order a step of the bias between the runs cannot be told from D_F, "
-                    "D_II, D_SS, D_OO: use the balanced order, or state that power was not "
-                    "interrupted",
-                    Level::doubtful});
+    list.push_back(
+        {"order",
+         "in this order a step of the bias between the runs cannot be distinguished from D_F, "
+         "D_II, D_SS, D_OO: use the balanced order, or state that power was not "
+         "interrupted",
+         Level::doubtful});
 }
 
 std::string smallest_seen(const Assessment& a) {

@@ -81,12 +81,12 @@ struct Calibration::Impl {
         settings.lever_arm_m = in_order(s.upright, s.lever_arm_m);
         const Observability seen = observability(s.plan.segments_deg(), s.site);
         for (std::size_t i = 0; i < 3; ++i)
-            told_apart[i] = seen.degree[static_cast<std::size_t>(kAccelerometer) + i] > 0;
+            observable[i] = seen.degree[static_cast<std::size_t>(kAccelerometer) + i] > 0;
     }
 
     CalibrationSettings settings;
     std::optional<ZeroFilter> filter;
-    std::array<bool, 3> told_apart{true, true, true};  ///< from tilt, by the plan
+    std::array<bool, 3> observable{true, true, true};  ///< from tilt, by the plan
     std::vector<CalibrationTrace> trace;
     std::array<std::optional<double>, 3> converged_s;
     std::array<double, 3> movement{};
@@ -197,7 +197,8 @@ struct Calibration::Impl {
         if (std::abs(rate) > 0.2 * planned) still_since_s = now_s;
         if (now_s - still_since_s >= kNoMotion_s) {
             return give_up(
-                text("azimuth has not turned for %.0f s: x and y zeros cannot be told from tilt "
+                text("azimuth has not turned for %.0f s: x and y zeros cannot be distinguished "
+                     "from tilt "
                      "(rank 12 of 15)",
                      now_s - still_since_s));
         }
@@ -415,7 +416,7 @@ struct Calibration::Impl {
                  v.mean_nis, v.low, v.high, v.outside, v.blocks, row.c_str()));
     }
 
-    /// What the filter knows, before what cannot be told apart is added.
+    /// What the filter knows, before what is not observable is added.
     [[nodiscard]] Joint joint() const {
         Eigen::Matrix<double, Joint::kSize, 1> unit;
         std::array<Eigen::Index, Joint::kSize> state{};
@@ -456,8 +457,9 @@ struct Calibration::Impl {
                 const auto k = static_cast<Eigen::Index>(i);
                 AxisResult& axis = r.axis[i];
                 axis.zero_mg = r.joint.value[i];
-                if (!told_apart[i]) {
-                    // Not told from tilt: as unsure as before, and by what the filter makes of it.
+                if (!observable[i]) {
+                    // Not separable from tilt: as unsure as before, and by what the filter makes of
+                    // it.
                     r.joint.covariance[i][i] = settings.initial.zero_mg * settings.initial.zero_mg +
                                                axis.zero_mg * axis.zero_mg;
                 }

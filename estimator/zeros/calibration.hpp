@@ -26,8 +26,9 @@ struct Noise {
     double gyro_drift = 0;               ///< of the biases, deg/h per sqrt(h)
     double accelerometer_drift = 0;      ///< of the zeros, mg per sqrt(h)
     double scale_factor = 100 * kMicro;  ///< of the vertical accelerometer, not known better
-    /// Of an accelerometer towards another axis as the gyros see it, rad, not known better: 1 g of
-    /// it is in x and y as long as z has been up only, and a unit off level has its share of it.
+    /// Tilt of an accelerometer towards another axis as the gyros see it, rad, not known better: 1
+    /// g of it is in x and y as long as z has been up only, and a unit off level has its share of
+    /// it.
     double misalignment = kDeclaredCross;
 };
 
@@ -66,7 +67,7 @@ struct Increment {
 
 struct AxisResult {
     double zero_mg = 0;   ///< level: zero plus misalignment, upright: plus scale error, times 1 g
-    double sigma_mg = 0;  ///< of what is called zero: with the share of what is not told apart
+    double sigma_mg = 0;  ///< of what is called zero: with the share of what is not observable
     double filter_sigma_mg = 0;
     double movement_mg = 0;  ///< of the estimate within the last sweep
     std::optional<double> converged_s;
@@ -100,10 +101,10 @@ struct CalibrationResult {
     std::array<AxisResult, 3> axis;
     Triple gyro_bias_deg_h{};
     Triple gyro_sigma_deg_h{};
-    std::array<Triple, 3> covariance_mg2{};         ///< of the zeros, with what is not told apart
+    std::array<Triple, 3> covariance_mg2{};         ///< of the zeros, with what is not observable
     std::array<Triple, 3> filter_covariance_mg2{};  ///< without
     Joint joint;
-    /// Of the vertical gyro against the azimuth read-out, 1; none without a read-out.
+    /// Gain of the vertical gyro against the azimuth read-out, 1; none without a read-out.
     std::optional<double> gyro_gain;
     InnovationStatistic innovation;
     double time_s = 0;

@@ -12,15 +12,15 @@ inline constexpr std::array<const char*, 15> kStateNames{
     "phi_E",  "phi_N", "phi_U", "dV_E",  "dV_N",  "dV_U",  "latitude", "longitude",
     "height", "eps_x", "eps_y", "eps_z", "nab_x", "nab_y", "nab_z"};
 
-/// Of the scaled stripped observability matrix: 1e-3 rad, 1 m/s, 1 m, 0.1 deg/h, 1e-3 g, 30 s.
-/// Sufficient: rank 15 (singular values above 1e-10 of the largest) and no singular value below
-/// 1e-5. The largest is no measure for the latter: it is the 30 s in which velocity becomes
-/// position.
+/// Rank and singular values of the scaled stripped observability matrix: 1e-3 rad, 1 m/s, 1 m, 0.1
+/// deg/h, 1e-3 g, 30 s. Sufficient: rank 15 (singular values above 1e-10 of the largest) and no
+/// singular value below 1e-5. The largest is no measure for the latter: it is the 30 s in which
+/// velocity becomes position.
 struct Observability {
     int rank = 0;
     std::array<double, 15> singular{};  ///< falling; 1 is a state measured once, directly
     std::array<double, 15> degree{};    ///< of each state; 0: not observable
-    /// What cannot be told apart, in scaled states.
+    /// Combinations that are not observable, in scaled states.
     std::vector<std::array<double, 15>> null_vectors;
 
     [[nodiscard]] bool sufficient() const noexcept;

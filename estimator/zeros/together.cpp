@@ -89,7 +89,7 @@ Solution solve(const std::vector<CalibrationResult>& runs, const Unknowns& at, d
                                           .solve(Eigen::MatrixXd::Identity(kSize, kSize));
         const Eigen::Map<const Eigen::VectorXd> value(run.joint.value.data(), kSize);
         right += seen.transpose() * (information * value);
-        // What the filter was told beforehand of what is shown of the level axes is the same in
+        // The filter's prior of what is shown of the level axes is the same in
         // all runs and counts once.
         for (std::size_t state = 3; state < Joint::kSize; ++state) {
             const double prior = run.joint.prior[state];

@@ -72,18 +72,18 @@ TEST_F(RestCheckTest, NamesTheKeyThatWouldExplainIt) {
                 Contains(HasSubstr("platform.encoder_sign: 1 instead of -1 of the inner")));
     EXPECT_LE(check.suspects.size(), 3U);
     EXPECT_TRUE(released());
-    // Whoever arms next is told nothing of it: each campaign looks for itself.
+    // The next arming does not mention it: each campaign looks for itself.
     EXPECT_TRUE(command(Kind::arm).accepted);
 }
 
 TEST_F(RestCheckTest, TellsWhatIsTooLittleToRefuse) {
     ready_with([](auto& s) {
-        s.azimuth_deg = 1.2;  // N and E off by 10.5 sin 1.2 deg = 0.22 deg/h: told beyond 0.1
+        s.azimuth_deg = 1.2;  // N and E off by 10.5 sin 1.2 deg = 0.22 deg/h: warned above 0.1
     });
     run();
     const auto check = status().rest_check;
     EXPECT_STREQ(check.verdict, "told");
-    EXPECT_THAT(check.message, HasSubstr("told beyond 0.10, refused beyond 0.50"));
+    EXPECT_THAT(check.message, HasSubstr("warned above 0.10, refused above 0.50"));
     EXPECT_THAT(check.suspects, Contains(HasSubstr("site.azimuth_deg: ")));
 }
 

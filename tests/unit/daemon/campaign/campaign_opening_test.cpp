@@ -18,7 +18,7 @@ TEST_F(OpeningTest, ARightConfigurationGoesOn) {
     run_check();
     EXPECT_EQ(status().state, CampaignState::slewing) << status().reason;
     EXPECT_THAT(events, Contains("opening check: the rig is what its configuration says"));
-    EXPECT_THAT(events, Not(Contains(HasSubstr("told beyond"))));
+    EXPECT_THAT(events, Not(Contains(HasSubstr("warned above"))));
     EXPECT_TRUE(run_until(CampaignState::ramping, 60));
     EXPECT_FALSE(slewed_while_moving);
     EXPECT_THAT(campaign->arming_text({Kind::arm, "Ada", ""}), HasSubstr("about 7 min"));

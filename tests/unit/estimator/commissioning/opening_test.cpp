@@ -143,8 +143,8 @@ TEST(Opening, TimeInMinutesIsNamed) {
 
 TEST(Opening, RefusesNoRightRigAndTellsOfFew) {
     // GIVEN 200 rigs with drift as gyros have it, on bases that lean, described as they
-    // are THEN none is refused, and few are told
-    int told = 0;
+    // are THEN none is refused, and few have a warning
+    int warned = 0;
     double chi2 = 0;
     for (std::uint64_t seed = 1; seed <= 200; ++seed) {
         plant::Random random(seed, 9);
@@ -155,15 +155,15 @@ TEST(Opening, RefusesNoRightRigAndTellsOfFew) {
         settings.elevation_deg = truth.base_tilt_deg[1];  // as commissioning finds it
         const auto found = hold_at_rest(settings, rest_of(truth, settings, seed));
         EXPECT_THAT(found.refused, IsEmpty()) << "seed " << seed;
-        told += found.told.empty() ? 0 : 1;
+        warned += found.warned.empty() ? 0 : 1;
         chi2 += found.rest_chi2 / 200;
     }
-    EXPECT_LE(told, 2);
+    EXPECT_LE(warned, 2);
     EXPECT_NEAR(chi2, 7, 1.5);  // 7 degrees of freedom: sd of the mean 0.26, and the skewed axes
 }
 
 TEST(Opening, DriftsThatAreAllAtOnePlaceAreRefused) {
-    // GIVEN gimbals that are told to turn, say that they are there, and stand still
+    // GIVEN gimbals that are commanded to turn, say that they are there, and stand still
     auto stops = rest_of({}, {}, 24);
     for (std::size_t i = 1; i < 4; ++i) stops[i] = stops[0];
     const auto found = hold_at_rest({}, stops);

@@ -165,17 +165,17 @@ TEST(Torquers, WhatIsDeadOneSidedOrOutOfScaleIsRefusedAndNamed) {
     }
 }
 
-TEST(Torquers, WhatIsOddIsToldAndWhatNoDescriptionFitsIsRefused) {
+TEST(Torquers, WhatIsOddIsReportedAndWhatNoDescriptionFitsIsRefused) {
     for (std::uint64_t seed = 1; seed <= kRigs; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         Rig rig(seed);
         const Matrix3d p = rig.truth_of_found(rig.found).array().round();
-        // 12 % off: told. 4 % off: not, five times the noise away from 5 %.
+        // 12 % off: a warning. 4 % off: none, five times the noise away from 5 %.
         auto f = find_by_torque(rig.found, rig.rate, rig.torqued(p * diagonal(1.12, 1, -0.96)));
         ASSERT_EQ(f.verdict, Verdict::decided) << f.why;
-        ASSERT_FALSE(f.told.empty());
-        EXPECT_THAT(f.told[0], HasSubstr("command X: the platform turns by 1.1"));
-        EXPECT_LE(f.told.size(), 2U) << "the azimuth zero of accelerometers 10' off, perhaps";
+        ASSERT_FALSE(f.warnings.empty());
+        EXPECT_THAT(f.warnings[0], HasSubstr("command X: the platform turns by 1.1"));
+        EXPECT_LE(f.warnings.size(), 2U) << "the azimuth zero of accelerometers 10' off, perhaps";
         // Gyro axes turned by 2 deg about z: the zero is theirs.
         const auto turned_by = [&p](double deg) -> Matrix3d {
             return p * Eigen::AngleAxisd(deg * std::numbers::pi / 180, Eigen::Vector3d::UnitZ())
@@ -185,7 +185,8 @@ TEST(Torquers, WhatIsOddIsToldAndWhatNoDescriptionFitsIsRefused) {
         ASSERT_EQ(f.verdict, Verdict::decided) << f.why;
         const double square = find_by_torque(rig.found, rig.rate, rig.torqued(p)).turn_arcmin;
         EXPECT_NEAR(f.turn_arcmin - square, 120, 8);
-        EXPECT_THAT(f.told, ::testing::Contains(HasSubstr("the azimuth zero is the torquers'")));
+        EXPECT_THAT(f.warnings,
+                    ::testing::Contains(HasSubstr("the azimuth zero is the torquers'")));
         f = find_by_torque(rig.found, rig.rate, rig.torqued(turned_by(8)));
         EXPECT_EQ(f.verdict, Verdict::refused);
         EXPECT_THAT(f.why, HasSubstr("turned by"));

@@ -141,7 +141,7 @@ TEST(Apart, ASweepWithoutForceIsLeftOut) {
     EXPECT_EQ(summary.used, 0U);
 }
 
-/// A random dwell once more with what a controller says that it played, 40 s of 40/s: samples know
+/// A random dwell once more with what a controller reports as played, 40 s of 40/s: samples know
 /// the mean square to sqrt(2/1600) = 3.5 %, the PSD of 100 Hz to 1.6 % and its gain 1 %.
 struct PlayedDwell : ::testing::Test {
     static constexpr double kLevel_g = 6;
@@ -154,7 +154,7 @@ struct PlayedDwell : ::testing::Test {
         plan.info.random = {kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0};
         before = rig.dwell(to, plan);
     }
-    [[nodiscard]] static PlayedRandom told(double times) {
+    [[nodiscard]] static PlayedRandom reported(double times) {
         return {PlayedRandom::Word::good,
                 {times * kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0},
                 {},
@@ -166,7 +166,7 @@ TEST_F(PlayedDwell, HasThePsdsLevel) {
     ASSERT_FALSE(before.left_out) << before.reason;
     ASSERT_EQ(to.rows().size(), 1U);
     const DwellRow was = to.rows()[0];
-    const DwellSummary now = to.played(told(1.05));
+    const DwellSummary now = to.played(reported(1.05));
     EXPECT_FALSE(now.flagged) << now.reason;
     ASSERT_EQ(to.rows().size(), 1U);
     const DwellRow& row = to.rows()[0];
@@ -179,11 +179,11 @@ TEST_F(PlayedDwell, HasThePsdsLevel) {
                 1 + 0.05 * psd / (psd + samples), 2e-3);
     EXPECT_EQ(now.kappa, row.vibration.kappa);
     EXPECT_EQ(to.result().dwells.back().kappa, now.kappa);
-    EXPECT_EQ(to.played(told(1)).samples, 0U) << "once for each dwell";
+    EXPECT_EQ(to.played(reported(1)).samples, 0U) << "once for each dwell";
 }
 
 TEST_F(PlayedDwell, OneThatTheAccelerometersContradictIsRejected) {
-    const DwellSummary now = to.played(told(1.3));
+    const DwellSummary now = to.played(reported(1.3));
     EXPECT_TRUE(now.left_out && now.flagged);
     EXPECT_NE(std::string(now.reason).find("the controller's PSD disagree"), std::string::npos);
     EXPECT_EQ(now.used, 0U);
@@ -196,7 +196,7 @@ TEST_F(PlayedDwell, OneThatItsProfileContradictedComesBack) {
     plan.info.random = {1.3 * kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0};
     ASSERT_TRUE(rig.dwell(to, plan).left_out);
     ASSERT_EQ(to.rows().size(), 1U);
-    const DwellSummary now = to.played(told(1));
+    const DwellSummary now = to.played(reported(1));
     EXPECT_FALSE(now.left_out) << now.reason;
     EXPECT_GT(now.used, 0U);
     ASSERT_EQ(to.rows().size(), 2U);

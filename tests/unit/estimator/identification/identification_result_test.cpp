@@ -19,7 +19,7 @@ TEST(CrossCheck, TheBatchAgreesWithTheFilterOnEitherRouteAndAtOneLevel) {
         EXPECT_TRUE(result.cross_check.done);
         EXPECT_GT(result.cross_check.largest, 0) << "two ways never agree to the last bit";
         EXPECT_LE(result.cross_check.largest, CrossCheck::kLimit) << result.cross_check.coefficient;
-        EXPECT_FALSE(told(result, "batch least squares"));
+        EXPECT_FALSE(reported(result, "batch least squares"));
     }
 }
 
@@ -35,7 +35,7 @@ TEST(CrossCheck, ADisagreementNamesItsCoefficient) {
         });
     // THEN the warning names the coefficient that differs most
     EXPECT_FALSE(result.cross_check.agrees());
-    EXPECT_TRUE(told(result, "puts " + result.cross_check.coefficient + " off by"));
+    EXPECT_TRUE(reported(result, "puts " + result.cross_check.coefficient + " off by"));
 }
 
 TEST(CrossCheck, WithoutDataNothingIsCompared) {

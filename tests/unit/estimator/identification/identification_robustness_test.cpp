@@ -107,7 +107,7 @@ std::size_t with_reason(const Result& result, const std::string& part) {
         }));
 }
 
-TEST(Robustness, CrestsCutByLittleAreTold) {
+TEST(Robustness, CrestsCutByLittleAreReported) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     struct Case {
         const char* name;
@@ -269,7 +269,7 @@ TEST(Robustness, ResolversThatAllStandStillAreAQuietSourceNotAStuckOne) {
     EXPECT_FALSE(summary.flagged) << summary.reason;
 }
 
-TEST(Robustness, EncodersThatAverageAreToldByTheCorrelationOfTheirNoise) {
+TEST(Robustness, EncodersThatAverageAreRecognisedByTheCorrelationOfTheirNoise) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     // GIVEN encoders that show the running mean of their last 8 readings, and settings that take
     // this for white noise of the same size
@@ -282,7 +282,7 @@ TEST(Robustness, EncodersThatAverageAreToldByTheCorrelationOfTheirNoise) {
     plan.duration_s = 40;
     rig.campaign(identification, {6.0, 14.0 / 3.0}, plan);
     const Result result = identification.result();
-    // THEN every dwell is told, and sigma is too small by not much: below 1.17
+    // THEN every dwell is reported, and sigma is too small by not much: below 1.17
     EXPECT_EQ(std::count_if(result.warnings.begin(), result.warnings.end(),
                             [](auto& text) { return text.find("not white") != text.npos; }),
               28);
@@ -290,13 +290,13 @@ TEST(Robustness, EncodersThatAverageAreToldByTheCorrelationOfTheirNoise) {
         EXPECT_LT(std::abs(result.value[i] - kTable2[i]), 4 * 1.17 * result.sigma[i])
             << parameter_names()[i];
     }
-    // and white noise is not told
+    // and white noise is not reported
     for (const std::string& text : Campaign().run({}).warnings) {
         EXPECT_EQ(text.find("not white"), std::string::npos) << text;
     }
 }
 
-TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowedAndTold) {
+TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowedAndReported) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     struct Case {
         std::array<double, 2> amplitudes_g;

@@ -12,7 +12,7 @@ namespace vibrig::estimator::testing {
 
 inline constexpr std::uint64_t kCrossSeed = 60;
 
-inline bool told(const Result& result, const std::string& words) {
+inline bool reported(const Result& result, const std::string& words) {
     return std::any_of(result.warnings.begin(), result.warnings.end(),
                        [&](const std::string& text) { return text.find(words) != text.npos; });
 }

@@ -32,7 +32,7 @@ TEST(PlanReport, TwoLevelsOverTable1DetermineEverythingAsAccuratelyAsTheBound) {
     }
 }
 
-TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
+TEST(PlanReport, OneLevelIsReportedByNameWithTheCombinationBeforeAndAfterTheRun) {
     // GIVEN one level: kappa = 19 with 9 g at the table
     Settings settings;
     settings.transmission = 2.0 / 3.0;
@@ -42,7 +42,7 @@ TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
         const std::size_t place = i % 10;
         EXPECT_EQ(report.observable[i], place != 0 && (place < 4 || place > 6));
     }
-    // THEN the plan is told by the names and sums that the result of such a run has
+    // THEN the plan is stated by the names and sums that the result of such a run has
     const Result result = identified(settings, {6, 6});
     EXPECT_EQ(report.observable, result.observable);
     ASSERT_EQ(report.combinations.size(), result.combinations.size());
@@ -61,7 +61,7 @@ TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
     EXPECT_NE(lines.at(1).find("determined is D_Fx + 19 D_OOx"), std::string::npos) << lines.at(1);
 }
 
-TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsToldBeforeAndAfterTheRun) {
+TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsReportedBeforeAndAfterTheRun) {
     Settings settings;
     settings.method = Method::two_step;
     settings.transmission = 2.0 / 3.0;
@@ -89,10 +89,10 @@ TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsToldBeforeAndAfterTheRun) {
     // AND after it
     const Result result = identified(settings, {6, 6});
     EXPECT_EQ(std::count(result.observable.begin(), result.observable.end(), true), 0);
-    EXPECT_TRUE(told(result, "two runs of different vibration level, found kappa "));
+    EXPECT_TRUE(reported(result, "two runs of different vibration level, found kappa "));
 }
 
-TEST(PlanReport, TooFewPositionsOrAnUnsuitableVerticalAreTold) {
+TEST(PlanReport, TooFewPositionsOrAnUnsuitableVerticalAreReported) {
     Settings settings;
     const auto undetermined = [](const PlanReport& report) {
         return std::count(report.observable.begin(), report.observable.end(), false);

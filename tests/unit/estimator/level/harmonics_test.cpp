@@ -10,8 +10,8 @@ namespace vibrig::estimator {
 namespace {
 
 /// So much of the fundamental's amplitude at 2 f .. 5 f, with phases of their own.
-Harmonics::Shares told(double hz, double rate_hz, const std::array<double, 4>& relative,
-                       double off_hz = 0, double seconds = 20, double gap_from_s = 1e9) {
+Harmonics::Shares reported(double hz, double rate_hz, const std::array<double, 4>& relative,
+                           double off_hz = 0, double seconds = 20, double gap_from_s = 1e9) {
     constexpr double kNoise = 1e-4;
     std::mt19937_64 random(5);
     std::normal_distribution<double> noise(0, kNoise);
@@ -35,7 +35,7 @@ TEST(HarmonicsTest, SharesAreSquaresOfTheAmplitudes) {
     double all = 1;
     for (const double one : relative) all += one * one;
     for (const double rate : {400.0, 1000.0}) {
-        const auto shares = told(30.1, rate, relative);
+        const auto shares = reported(30.1, rate, relative);
         for (std::size_t k = 0; k < 4; ++k)
             EXPECT_NEAR(shares[k], relative[k] * relative[k] / all, 2e-6) << k << " at " << rate;
     }
@@ -44,18 +44,18 @@ TEST(HarmonicsTest, SharesAreSquaresOfTheAmplitudes) {
 TEST(HarmonicsTest, AFrequencyOffItsCommandAndGapsMatterLittle) {
     const std::array<double, 4> relative{0.05, 0, 0, 0};
     // A main lobe of 2 Hz either side falls by 1 % at 0.05 Hz, by 4 % at twice that.
-    EXPECT_NEAR(told(30.1, 400, relative, 0.05)[0], 0.0025, 0.05 * 0.0025);
-    EXPECT_NEAR(told(30.1, 400, relative, 0, 20, 7.3)[0], 0.0025, 1e-5);
-    EXPECT_EQ(told(30.1, 400, relative, 0, 20, 7.3)[2], 0);
+    EXPECT_NEAR(reported(30.1, 400, relative, 0.05)[0], 0.0025, 0.05 * 0.0025);
+    EXPECT_NEAR(reported(30.1, 400, relative, 0, 20, 7.3)[0], 0.0025, 1e-5);
+    EXPECT_EQ(reported(30.1, 400, relative, 0, 20, 7.3)[2], 0);
 }
 
-TEST(HarmonicsTest, WhatTheSamplingRateDoesNotTellIsNotTold) {
+TEST(HarmonicsTest, WhatTheSamplingRateDoesNotShowIsNotReported) {
     const std::array<double, 4> relative{0.05, 0.05, 0.05, 0.05};
-    EXPECT_EQ(told(15, 40, relative), Harmonics::Shares{});
-    const auto at_100 = told(15.1, 100, relative);  // 2 f and no more lies below 45 Hz
+    EXPECT_EQ(reported(15, 40, relative), Harmonics::Shares{});
+    const auto at_100 = reported(15.1, 100, relative);  // 2 f and no more lies below 45 Hz
     EXPECT_GT(at_100[0], 0.002);
     EXPECT_EQ(at_100[1], 0);
-    EXPECT_EQ(told(30.1, 400, {}), Harmonics::Shares{});
+    EXPECT_EQ(reported(30.1, 400, {}), Harmonics::Shares{});
     EXPECT_EQ(Harmonics().shares(0.01), Harmonics::Shares{});
 }
 

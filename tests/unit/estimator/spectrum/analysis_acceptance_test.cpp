@@ -66,7 +66,7 @@ void expect_survey_predicts(unsigned campaigns, double slack) {
         const Analysis found = campaign(undeclared(), truth, survey(), seed);
         for (const Mixture& gyro : found.gyros) {
             EXPECT_TRUE(gyro.named()) << "seed " << seed;
-            EXPECT_NEAR(tell(gyro).at(0).hz.mean, 60, 0.5) << "seed " << seed;
+            EXPECT_NEAR(estimates(gyro).at(0).hz.mean, 60, 0.5) << "seed " << seed;
         }
         EXPECT_EQ(found.model.highest_hz, 125);
         EXPECT_TRUE(found.model.refusal.empty()) << found.model.refusal;
@@ -256,8 +256,8 @@ std::array<std::pair<double, double>, 3> least_sigmas(const Truth& truth, double
         for (Index k = 0; k < 63; ++k)
             problem.rate[k] =
                 dwells.list[static_cast<std::size_t>(k)].row.rate[static_cast<Index>(j)];
-        const auto told = tell(two_resonances(table, j, problem, f1));
-        const auto& [low, high] = std::minmax(told.at(0).hz, told.at(1).hz,
+        const auto fitted = estimates(two_resonances(table, j, problem, f1));
+        const auto& [low, high] = std::minmax(fitted.at(0).hz, fitted.at(1).hz,
                                               [](auto& a, auto& b) { return a.mean < b.mean; });
         out[j] = {low.sigma, high.sigma};
         std::printf("gyro %zu: %.2f +- %.2f and %.2f +- %.2f Hz\n", j, low.mean, low.sigma,
@@ -279,9 +279,9 @@ double error_with_two(const Truth& truth, double f1, double f2, unsigned campaig
         for (std::size_t j = 0; j < 3; ++j) {
             EXPECT_TRUE(found.second[j]) << f1;
             EXPECT_GE(found.lack_of_fit[j], kAlarm);
-            const auto told = tell(found.gyros[j]);
-            if (told.size() != 2) continue;
-            const auto& [low, high] = std::minmax(told[0].hz, told[1].hz,
+            const auto fitted = estimates(found.gyros[j]);
+            if (fitted.size() != 2) continue;
+            const auto& [low, high] = std::minmax(fitted[0].hz, fitted[1].hz,
                                                   [](auto& a, auto& b) { return a.mean < b.mean; });
             for (const auto& [mean, is, sigma] : {std::array{low.mean, f1, theory[j].first},
                                                   std::array{high.mean, f2, theory[j].second}}) {
@@ -400,20 +400,20 @@ TEST(SpectrumAcceptance, SoakResonanceBeyondThePlanIsNotCovered) {
 struct Intervals {
     unsigned hz = 0, damping = 0, all = 0;
     void add(const Mixture& gyro, const std::vector<ElasticPart>& truth, unsigned seed) {
-        const auto holds = [](const Spread& told, double is) {
-            return told.low <= is && is <= told.high ? 1U : 0U;
+        const auto holds = [](const Spread& interval, double is) {
+            return interval.low <= is && is <= interval.high ? 1U : 0U;
         };
-        const auto told = tell(gyro);
-        for (const Told& one : told) {
+        const auto fitted = estimates(gyro);
+        for (const ResonanceEstimate& one : fitted) {
             EXPECT_GE(one.hz.low, kLowestResonance) << "seed " << seed;
             EXPECT_LE(one.hz.high, kHighestResonance) << "seed " << seed;
             EXPECT_LE(one.hz.low, one.hz.high) << "seed " << seed;
             EXPECT_GT(one.damping.low, 0) << "seed " << seed;
         }
-        if (told.size() != 1 || truth.empty()) return;
+        if (fitted.size() != 1 || truth.empty()) return;
         ++all;
-        hz += holds(told[0].hz, truth[0].resonance.hz);
-        damping += holds(told[0].damping, truth[0].resonance.damping);
+        hz += holds(fitted[0].hz, truth[0].resonance.hz);
+        damping += holds(fitted[0].damping, truth[0].resonance.damping);
     }
 };
 

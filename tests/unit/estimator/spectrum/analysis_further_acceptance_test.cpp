@@ -68,7 +68,7 @@ double error_over_sigma(double s, bool budgeted, unsigned campaigns) {
         Dwells dwells = dwells_of(settings, {}, survey());
         for (SpectralDwell& dwell : dwells.list) {
             if (!dwell.kind) continue;
-            // The true level made the rates; this one is told.
+            // The true level made the rates; this one is stated.
             DwellRow& row = dwell.row;
             row.vibration.kappa = 1 + (row.vibration.kappa - 1) * (1 + s * normal(random));
             row.random = true;

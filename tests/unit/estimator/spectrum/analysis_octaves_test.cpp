@@ -73,11 +73,11 @@ Found of_campaigns(double s, unsigned campaigns) {
             undeclared(), SpectralTable(undeclared(), dwells.list, dwells.kinds), Form::automatic);
         for (const Mixture& gyro : found.gyros) {
             EXPECT_TRUE(gyro.named()) << "seed " << seed;
-            const auto told = tell(gyro);
-            EXPECT_EQ(told.size(), 1U) << "seed " << seed;
-            if (told.empty()) continue;
-            out.hz += std::pow(told[0].hz.mean - kSixty.hz, 2);
-            out.damping += std::pow(told[0].damping.mean - kSixty.damping, 2);
+            const auto fitted = estimates(gyro);
+            EXPECT_EQ(fitted.size(), 1U) << "seed " << seed;
+            if (fitted.empty()) continue;
+            out.hz += std::pow(fitted[0].hz.mean - kSixty.hz, 2);
+            out.damping += std::pow(fitted[0].damping.mean - kSixty.damping, 2);
             ++out.gyros;
         }
         const auto add = [&](const Profile& profile, double& square, double& in_u) {

@@ -26,7 +26,7 @@ PsdExpected flat() {
 }
 
 /// As a controller with lines of 1 Hz has it, and room for 20 more.
-Pairs told() {
+Pairs reported() {
     Pairs pairs;
     for (int i = 0; i <= 100; ++i) pairs.push_back({20.0 + i, i % 2 == 0 ? 0.0102 : 0.0098});
     pairs.resize(pairs.size() + 20);
@@ -34,13 +34,13 @@ Pairs told() {
 }
 
 std::string refused(const std::function<void(Pairs&)>& spoil, PsdExpected expected = flat()) {
-    Pairs pairs = told();
+    Pairs pairs = reported();
     spoil(pairs);
     return take_controller_psd(pairs, expected).wrong;
 }
 
 TEST(ControllerPsd, IsTakenAsItCame) {
-    const auto taken = take_controller_psd(told(), flat());
+    const auto taken = take_controller_psd(reported(), flat());
     EXPECT_EQ(taken.wrong, "");
     ASSERT_EQ(taken.psd.psd.size(), 101U);
     EXPECT_EQ(taken.psd.psd[1], (std::pair<double, double>{21, 0.0098}));
@@ -86,7 +86,7 @@ TEST(ControllerPsd, TooLittleOfItIsRefused) {
 }
 
 TEST(ControllerPsd, WhatDoesNotChangeIsOfAnotherDwell) {
-    const Pairs before = told();
+    const Pairs before = reported();
     PsdExpected expected = flat();
     expected.before = before;
     EXPECT_THAT(take_controller_psd(before, expected).wrong, HasSubstr("to the last bit"));

@@ -171,7 +171,7 @@ TEST(Exposure, TwoAxesAtOnceDriftAsMassesThatAreIntegratedInTime) {
             out(1, 1) = c;
             return out;
         };
-        const Prediction told = predict(known(), {drawn.situation()});
+        const Prediction predicted = predict(known(), {drawn.situation()});
         const Attitude shaken = attitude({}, kGimbals, moment(nn, nu, uu));
         for (std::size_t j = 0; j < 3; ++j) {
             const Attitude more =
@@ -182,24 +182,25 @@ TEST(Exposure, TwoAxesAtOnceDriftAsMassesThatAreIntegratedInTime) {
             for (std::size_t q = 0; q < 6; ++q)
                 drift += kHalf * more.vibration[j][static_cast<Index>(q)] *
                          all[internal_index(kDii + q, j)];
-            EXPECT_NEAR(told.drift(0, static_cast<Index>(j)), drift, 2e-4) << "gyro " << j;
+            EXPECT_NEAR(predicted.drift(0, static_cast<Index>(j)), drift, 2e-4) << "gyro " << j;
         }
     }
 }
 
-TEST(Exposure, RealisationsOfTwoAxesVaryAsForetold) {
+TEST(Exposure, RealisationsOfTwoAxesVaryAsPredicted) {
     constexpr int kDraws = 400;
     std::mt19937_64 random(12);
     const Model model = known();
-    const Prediction told = predict(model, {under(two_axes(), Realised::kTime)});
+    const Prediction predicted = predict(model, {under(two_axes(), Realised::kTime)});
     Eigen::MatrixXd drifts(kDraws, 3);
     for (int k = 0; k < kDraws; ++k)
         drifts.row(k) = predict(model, {Realised(two_axes(), random).situation()}).drift.row(0);
     for (Index j = 0; j < 3; ++j) {
-        const double sigma = told.realisation(0, j);
-        EXPECT_NEAR(drifts.col(j).mean(), told.drift(0, j), 4 * sigma / std::sqrt(kDraws)) << j;
+        const double sigma = predicted.realisation(0, j);
+        EXPECT_NEAR(drifts.col(j).mean(), predicted.drift(0, j), 4 * sigma / std::sqrt(kDraws))
+            << j;
         const double ratio =
-            (drifts.col(j).array() - told.drift(0, j)).square().mean() / (sigma * sigma);
+            (drifts.col(j).array() - predicted.drift(0, j)).square().mean() / (sigma * sigma);
         // 400 squares of nearly normal numbers: sqrt(2 / 400), four of them.
         EXPECT_NEAR(ratio, 1, 4 * std::sqrt(2.0 / kDraws)) << j;
     }

@@ -55,16 +55,16 @@ TEST_F(GoldenSurvey, CoefficientsAtTheTrueResonance) {
 TEST_F(GoldenSurvey, MixtureFindsTheResonance) {
     const Mixture found = one_resonance(*table, 0, problem);
     ASSERT_TRUE(found.resonant());
-    const Told told = tell(found).at(0);
-    EXPECT_NEAR(told.hz.mean, 59.993, 0.02);
-    EXPECT_NEAR(told.hz.sigma, 0.152, 0.02);
-    EXPECT_NEAR(told.damping.mean, 0.0502, 0.0003);
-    EXPECT_NEAR(told.damping.sigma, 0.0016, 0.0003);
+    const ResonanceEstimate fitted = estimates(found).at(0);
+    EXPECT_NEAR(fitted.hz.mean, 59.993, 0.02);
+    EXPECT_NEAR(fitted.hz.sigma, 0.152, 0.02);
+    EXPECT_NEAR(fitted.damping.mean, 0.0502, 0.0003);
+    EXPECT_NEAR(fitted.damping.sigma, 0.0016, 0.0003);
     // Well determined, so normal: 95 % lie within 1.96 sigma.
-    EXPECT_NEAR(told.hz.low, 59.993 - 1.96 * 0.152, 0.02);
-    EXPECT_NEAR(told.hz.high, 59.993 + 1.96 * 0.152, 0.02);
-    EXPECT_NEAR(told.damping.low, 0.0502 - 1.96 * 0.0016, 0.0005);
-    EXPECT_NEAR(told.damping.high, 0.0502 + 1.96 * 0.0016, 0.0005);
+    EXPECT_NEAR(fitted.hz.low, 59.993 - 1.96 * 0.152, 0.02);
+    EXPECT_NEAR(fitted.hz.high, 59.993 + 1.96 * 0.152, 0.02);
+    EXPECT_NEAR(fitted.damping.low, 0.0502 - 1.96 * 0.0016, 0.0005);
+    EXPECT_NEAR(fitted.damping.high, 0.0502 + 1.96 * 0.0016, 0.0005);
     EXPECT_GT(found.log_odds, 600);
     EXPECT_LE(found.list.size(), 300U);
     EXPECT_EQ(found.degrees, 45);

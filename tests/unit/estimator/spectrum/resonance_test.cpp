@@ -35,7 +35,7 @@ Mixture of_share(double share) {
 }
 
 /// Log odds of 1: 73 % a resonance, on many hypotheses, each of which weighs less than none does.
-TEST(Resonance, IsToldByAllThatItWeighsAndNotByItsHeaviestHypothesis) {
+TEST(Resonance, IsDecidedByAllThatItWeighsAndNotByItsHeaviestHypothesis) {
     double low = 0, high = 0.05;
     for (int i = 0; i < 20; ++i) {
         const double middle = (low + high) / 2;
@@ -48,18 +48,18 @@ TEST(Resonance, IsToldByAllThatItWeighsAndNotByItsHeaviestHypothesis) {
     EXPECT_TRUE(found.resonant());
     EXPECT_FALSE(found.named());
     EXPECT_EQ(found.degrees, 63 - 18);
-    ASSERT_EQ(tell(found).size(), 1U);
-    EXPECT_GE(tell(found)[0].hz.low, kLowestResonance);
-    EXPECT_LE(tell(found)[0].hz.high, kHighestResonance);
+    ASSERT_EQ(estimates(found).size(), 1U);
+    EXPECT_GE(estimates(found)[0].hz.low, kLowestResonance);
+    EXPECT_LE(estimates(found)[0].hz.high, kHighestResonance);
     const Mixture none = of_share(0);
     EXPECT_LT(none.log_odds, 0);
     EXPECT_FALSE(none.resonant());
     EXPECT_EQ(none.degrees, 63 - 10);
-    EXPECT_TRUE(tell(none).empty());
+    EXPECT_TRUE(estimates(none).empty());
 }
 
-/// What is told of the ten, where both weigh: static under a resonance, else as they are at 15 Hz.
-TEST(Resonance, WeighsInWhatIsToldOfTheTenCoefficients) {
+/// What is known of the ten, where both weigh: static under a resonance, else as they are at 15 Hz.
+TEST(Resonance, WeighsInWhatIsKnownOfTheTenCoefficients) {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const Analysis found = campaign(undeclared(), Truth::common(0.003, kSixty), survey(), seed);
         bool any = false;

@@ -81,13 +81,13 @@ TEST(SurveyPlan, FrequenciesAreMovedOffWhatSamplingForbids) {
 TEST(SurveyPlan, LevelsAreWhatTheTableAndThePadsLeave) {
     // GIVEN 12 g, 1.5 m/s and 12 mm, and pads with 0.667 at 15 Hz, damping 0.2
     const TableLimits limits;
-    const std::vector<std::array<double, 3>> told{
+    const std::vector<std::array<double, 3>> expected{
         // Hz, g at the table, transmission
         {5, 1.21, 1.39},  {8, 3.09, 2.50},  {10, 4.83, 2.30}, {15, 10.87, .667},
         {20.7, 12, .322}, {27.3, 12, .196}, {35, 12, .134},   {45, 12, .095},
         {65, 12, .061},   {85, 12, .045},   {125, 12, .030},  {205, 12, .018}};
     // THEN they are those of the theory's table, to its last digit
-    for (const auto& [hz, table_g, ratio] : told) {
+    for (const auto& [hz, table_g, ratio] : expected) {
         EXPECT_NEAR(limits.table_g(hz), table_g, 0.006) << hz;
         EXPECT_NEAR(pads().transmission(hz).value(), ratio, ratio < 1 ? 0.0006 : 0.006) << hz;
     }
@@ -164,7 +164,7 @@ TEST(SurveyPlan, PositionsForAProfileMakeItsDriftBetterKnown) {
     }
 }
 
-TEST(SurveyPlan, WhatTheTestOfFlatnessWillSeeIsForetold) {
+TEST(SurveyPlan, WhatTheTestOfFlatnessWillSeeIsPredicted) {
     const auto lines = survey_lines_hard();
     const auto flat = planned_flatness(task_of(lines), survey_places(verticals(), lines, 7));
     EXPECT_EQ(flat.degrees, 108);

@@ -201,10 +201,10 @@ TEST(SweepPlan, AsTheBlocksOfItsSamplesDo) {
             m.angles_good = m.force_good = true;
             blocks.add(m, hz);
         }
-        const auto foretold = usable_blocks(of, rate_hz);
+        const auto predicted = usable_blocks(of, rate_hz);
         const Sweep sweep = blocks.finish();
-        EXPECT_EQ(sweep.blocks.size(), foretold.blocks);
-        EXPECT_NEAR(static_cast<double>(sweep.known()), static_cast<double>(foretold.known), 2)
+        EXPECT_EQ(sweep.blocks.size(), predicted.blocks);
+        EXPECT_NEAR(static_cast<double>(sweep.known()), static_cast<double>(predicted.known), 2)
             << rate_hz;
     }
 }

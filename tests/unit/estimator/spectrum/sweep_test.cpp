@@ -278,10 +278,10 @@ TEST(SweepOfThePlant, TellsTheFrequencyAsWellAsItSays) {
             const Mixture mixture = campaign.mixture(1, sweeps);
             EXPECT_TRUE(mixture.named()) << "seed " << seed;
             ASSERT_TRUE(mixture.resonant()) << "seed " << seed;
-            const Told told = tell(mixture).front();
-            sum += told.hz.mean - 60;
-            square += (told.hz.mean - 60) * (told.hz.mean - 60);
-            z += std::pow((told.hz.mean - 60) / told.hz.sigma, 2);
+            const ResonanceEstimate fitted = estimates(mixture).front();
+            sum += fitted.hz.mean - 60;
+            square += (fitted.hz.mean - 60) * (fitted.hz.mean - 60);
+            z += std::pow((fitted.hz.mean - 60) / fitted.hz.sigma, 2);
         }
         const double rms = std::sqrt(square / kSeeds), mean = sum / kSeeds;
         std::printf("# %s: %.3f Hz off, rms %.3f, %.2f of its sigma\n", up ? "up" : "down", mean,
@@ -355,7 +355,7 @@ TEST(Sweep, TakesPartWhereTwoResonancesAre) {
         constexpr std::size_t kY = 1;
         ASSERT_TRUE(without.second[kY] && with.second[kY]) << "seed " << seed;
         EXPECT_GT(with.lack_of_fit[kY], 1e-3) << "seed " << seed;
-        const auto before = tell(without.gyros[kY]), after = tell(with.gyros[kY]);
+        const auto before = estimates(without.gyros[kY]), after = estimates(with.gyros[kY]);
         ASSERT_EQ(after.size(), 2U);
         for (std::size_t r = 0; r < 2; ++r) {
             const bool low = after[r].hz.mean < 65;

@@ -18,7 +18,7 @@ namespace {
 using namespace testing;
 
 /// Dwell by dwell through the filter, as many rows for each run as there are positions. Of random
-/// vibration the filter is told `stated` times its mean square.
+/// vibration the filter is given `stated` times its mean square.
 std::map<std::size_t, std::vector<DwellRow>> rows_of(const plant::Truth& truth,
                                                      const plant::CampaignPlan& plan,
                                                      Settings& settings, double stated = 1) {

@@ -128,34 +128,34 @@ class Acceptance : public ::testing::Test {
                        const Settings& settings = {},
                        const Schedule& schedule = balanced_schedule()) {
         const Outcome o = outcome(settings, change, schedule, is.theory);
-        std::string told = what + ", seeds 1 to 20: bias " + std::to_string(o.bias_u) + " u_A, " +
+        std::string line = what + ", seeds 1 to 20: bias " + std::to_string(o.bias_u) + " u_A, " +
                            std::to_string(o.combined) + " u, rms " + std::to_string(o.rms) +
                            ", V D N " + std::to_string(o.levels[0]) + " " +
                            std::to_string(o.levels[1]) + " " + std::to_string(o.levels[2]) + ", " +
                            o.sentence;
         if (is.theory != nullptr)
-            told += ", theory: chi-square " + std::to_string(is.theory->chi_square) +
+            line += ", theory: chi-square " + std::to_string(is.theory->chi_square) +
                     ", named with " + std::to_string(is.theory->probability);
-        std::cout << told << '\n';
-        EXPECT_GE(count(o, is.levels), is.least) << told;
-        EXPECT_GE(count(o, is.at_least_levels), is.at_least) << told;
-        EXPECT_LE(o.bias_u, is.bias + 0.3) << told;
-        EXPECT_LE(o.combined, is.combined) << told;
-        EXPECT_LE(o.rms, is.rms) << told;
+        std::cout << line << '\n';
+        EXPECT_GE(count(o, is.levels), is.least) << line;
+        EXPECT_GE(count(o, is.at_least_levels), is.at_least) << line;
+        EXPECT_LE(o.bias_u, is.bias + 0.3) << line;
+        EXPECT_LE(o.combined, is.combined) << line;
+        EXPECT_LE(o.rms, is.rms) << line;
         if (is.theory == nullptr) return;
-        expect_shifts(o, *is.theory, told);
+        expect_shifts(o, *is.theory, line);
     }
     /// The estimator is linear in the rates: whatever weights the drift states have, its gain G
     /// moves the coefficients by G z. z is of the first order and of rows by theory: 3 % of it, and
     /// 0.3 u_A for the weights that change with it.
-    static void expect_shifts(const Outcome& o, const Naming& theory, const std::string& told) {
+    static void expect_shifts(const Outcome& o, const Naming& theory, const std::string& line) {
         // Which way round a size counts is each side's own convention.
         double same_way = 0;
         for (std::size_t i = 0; i < kParameters; ++i) same_way += o.shift[i] * theory.shift[i];
         for (std::size_t i = 0; i < kParameters; ++i)
             EXPECT_NEAR(std::copysign(1.0, same_way) * o.shift[i], o.predicted[i],
                         0.3 + 0.03 * std::abs(o.predicted[i]))
-                << parameter_names()[i] << " of " << told;
+                << parameter_names()[i] << " of " << line;
     }
 };
 

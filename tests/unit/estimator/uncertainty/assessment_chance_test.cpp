@@ -22,7 +22,7 @@ using estimator::testing::Schedule;
 struct Chance {
     double rms = 0;  ///< of errors in u_A
     std::array<int, 3> levels{};
-    int told = 0;  ///< campaigns with a reason of this code
+    int reported = 0;  ///< campaigns with a reason of this code
 };
 
 Chance over_seeds(int seeds, const std::function<void(plant::Truth&)>& change,
@@ -37,9 +37,9 @@ Chance over_seeds(int seeds, const std::function<void(plant::Truth&)>& change,
         const auto rig = from_samples(settings, truth, schedule);
         const Assessment a = assess(settings, rig.result);
         ++out.levels[static_cast<std::size_t>(a.verdict.level)];
-        bool told = false;
-        for (const Reason& reason : a.verdict.reasons) told = told || reason.code == code;
-        out.told += told ? 1 : 0;
+        bool reported = false;
+        for (const Reason& reason : a.verdict.reasons) reported = reported || reason.code == code;
+        out.reported += reported ? 1 : 0;
         for (std::size_t i = 0; i < kParameters; ++i) {
             const auto& c = a.coefficients[i];
             out.rms += std::pow((c.value - rig.truth[i]) / c.u_a, 2) / (seeds * 30.0);
@@ -57,7 +57,7 @@ void expect_by_chance(const char* what, const Chance& c, const std::string& leve
         if (levels.find("VDN"[l]) != std::string::npos) fitting += c.levels[l];
     }
     std::cout << what << ", seeds 1 to " << seeds << ": rms " << c.rms << ", V D N " << c.levels[0]
-              << " " << c.levels[1] << " " << c.levels[2] << ", told " << c.told << '\n';
+              << " " << c.levels[1] << " " << c.levels[2] << ", reported " << c.reported << '\n';
     EXPECT_GE(fitting, seeds - seeds / 20) << what;
     EXPECT_LE(c.rms, most_rms) << what;
 }
@@ -134,7 +134,7 @@ const double kRmsOfAngles = std::sqrt(1 + 3 * (1 - 3.6e-5 / 4.891201e-5));
 
 TEST(ByChance, HarmonicsThatAliasAndNoiseThatIsWrongAreDoubtful) {
     const Chance third_of_rate = aliased(2, 40.0 / 3);
-    EXPECT_EQ(third_of_rate.told, 2);
+    EXPECT_EQ(third_of_rate.reported, 2);
     EXPECT_EQ(third_of_rate.levels[0], 0);
     expect_by_chance("a quarter of the sample rate", aliased(2, 10), "D", 1.8, 2);
     // The third harmonic stands still at a third of the sample rate: 0.05 * 6 g sin(phase) over
@@ -152,7 +152,7 @@ TEST(ByChance, SoakOfHarmonicsThatAliasAndNoiseThatIsWrong) {
     for (const double frequency_hz : {40.0 / 3, 10.0}) {
         const Chance c = aliased(20, frequency_hz);
         expect_by_chance(frequency_hz > 11 ? "f = fs/3" : "f = fs/4", c, "D", 1.2);
-        EXPECT_EQ(c.told, 20);
+        EXPECT_EQ(c.reported, 20);
     }
     // What the levels do passes for nothing else, and what is wrong besides is seen all the same.
     expect_by_chance("f = fs/3, azimuth 12 arcmin", aliased(20, 40.0 / 3, kAzimuth_deg), "N", 1e9);
@@ -160,7 +160,7 @@ TEST(ByChance, SoakOfHarmonicsThatAliasAndNoiseThatIsWrong) {
     expect_by_chance("gyro noise 2 times", gyro, "D", 1.2);
     const Chance resolver = noisier(20, 1, 2);
     expect_by_chance("resolver noise 10 arcsec", resolver, "D", std::max(1.2, kRmsOfAngles));
-    EXPECT_GE(resolver.told, 19);
+    EXPECT_GE(resolver.reported, 19);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ TEST(ZeroObservability, RanksAndSingularValuesAreThoseOfTheErrorModel) {
             }
         }
     }
-    // At rest the horizontal zeros cannot be told from tilt, the vertical one can.
+    // At rest the horizontal zeros cannot be distinguished from tilt, the vertical one can.
     const Observability rest = observability({0}, site);
     expect_words(rest.unobservable(), {"phi_E with nab_y", "phi_N with nab_x", "phi_U"});
     EXPECT_EQ(rest.degree[12], 0);

@@ -283,7 +283,7 @@ TEST_F(Predict, WhatSuchACampaignDoesNotTellIsInTheResult) {
     for (const char* about : {"in step", "elliptic", "angular", "above the highest", "second",
                               "shock", "fixture", "one frequency are not flat"})
         EXPECT_THAT(all, HasSubstr(about));
-    EXPECT_THAT(run("identify survey.csv").out, HasSubstr("Not told either:"));
+    EXPECT_THAT(run("identify survey.csv").out, HasSubstr("Not shown either:"));
 }
 
 TEST_F(Predict, AlongThreeAxesAtOnceEachHasItsPart) {
