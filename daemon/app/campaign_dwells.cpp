@@ -41,7 +41,7 @@ void CampaignDwells::begin() {
     planning_.abandon();  // of a campaign that was aborted
     assessing_.abandon();
     with_.book.begin(planned_dwells());
-    verdict_told_.clear();
+    verdict_logged_.clear();
     take_type_prior();
     const std::lock_guard lock(mutex_);
     verdict_ = {};
@@ -167,8 +167,8 @@ void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
         if (!dwell.stop.psd.empty()) spectrum.psd_before = dwell.stop.psd;
         if (dwell.info.played && dwell.info.played->word == estimator::PlayedRandom::Word::good)
             spectrum.psds.push_back(
-                configuration::bands_told(configuration_, dwell.info.random.profile,
-                                          dwell.info.random.level_db, dwell.stop.psd));
+                configuration::reported_bands(configuration_, dwell.info.random.profile,
+                                              dwell.info.random.level_db, dwell.stop.psd));
     }
     const std::size_t count = done.size();
     if (why.empty() && !campaign.offer(std::move(done), std::move(stops)))

@@ -53,7 +53,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] bool order(const rt::DwellOrder& order) override;
     void swept(const estimator::spectrum::Sweep& sweep,
                const std::vector<std::array<double, 2>>& readings) override;
-    [[nodiscard]] campaign::Played played(const campaign::ToldPsd& told) override;
+    [[nodiscard]] campaign::Played played(const campaign::ReportedPsd& reported) override;
     [[nodiscard]] bool free() const override { return with_.book.free() && written(); }
     void levelled(const LevelDrift& drift) override { with_.book.levelled(drift); }
     [[nodiscard]] std::optional<campaign::Next> next(const std::array<double, 3>& here_deg,
@@ -113,7 +113,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] std::size_t planned_dwells() const;
     [[nodiscard]] bool verdict_wanted();
     void record_dwell(const estimator::DwellSummary& summary);
-    [[nodiscard]] std::string take_psd(const campaign::ToldPsd& told,
+    [[nodiscard]] std::string take_psd(const campaign::ReportedPsd& reported,
                                        estimator::PlayedRandom& played);
     void keep_revised(campaign::Campaign& campaign);
     void take_type_prior();
@@ -148,7 +148,7 @@ class CampaignDwells final : public campaign::Dwells {
     plan::Aside<Judged> assessing_{[this] { with_.control.notify(); }};
     bool verdict_due_ = false;  ///< on the dwells so far
     bool concluding_ = false;   ///< the last verdict is asked for
-    std::string verdict_told_, against_certificate_;
+    std::string verdict_logged_, against_certificate_;
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
 
     mutable std::mutex mutex_;  ///< guards what follows, which only this thread changes

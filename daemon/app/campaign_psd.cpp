@@ -1,4 +1,4 @@
-// What the controller says that it played in a random dwell.
+// What the controller reports as played in a random dwell.
 #include <spdlog/fmt/fmt.h>
 
 #include <utility>
@@ -12,10 +12,10 @@ namespace vibrig {
 using Word = estimator::PlayedRandom::Word;
 
 /// The Identification is this thread's: the dwell is over, and no other is ordered.
-campaign::Played CampaignDwells::played(const campaign::ToldPsd& told) {
+campaign::Played CampaignDwells::played(const campaign::ReportedPsd& reported) {
     campaign::Played out;
     const auto& dwell = ordered_.dwell;
-    const std::string why = take_psd(told, out.random);
+    const std::string why = take_psd(reported, out.random);
     if (!why.empty())
         with_.events.log(Severity::warning, "campaign",
                          fmt::format("run {} position {}: the controller's PSD {}: {}", dwell.run,
@@ -24,28 +24,29 @@ campaign::Played CampaignDwells::played(const campaign::ToldPsd& told) {
                                          ? "is refused"
                                          : "was not read, its profile's stands in its place",
                                      why));
-    if (!told.pairs.empty()) with_.book.spectrum().psd_before = told.pairs;
+    if (!reported.pairs.empty()) with_.book.spectrum().psd_before = reported.pairs;
     with_.book.played(out.random, out.summary);
     revised_ = true;
     if (with_.recorder)
-        with_.recorder->played({ordered_.from, dwell.run, dwell.position, out.random, told.pairs});
+        with_.recorder->played(
+            {ordered_.from, dwell.run, dwell.position, out.random, reported.pairs});
     record_dwell(out.summary);
     return out;
 }
 
 /// Why it is not taken, else empty.
-std::string CampaignDwells::take_psd(const campaign::ToldPsd& told,
+std::string CampaignDwells::take_psd(const campaign::ReportedPsd& reported,
                                      estimator::PlayedRandom& played) {
     namespace spectrum = estimator::spectrum;
     const auto& asked = ordered_.dwell.random;
     played.word = Word::not_read;
-    if (told.pairs.empty()) return told.why_not;
+    if (reported.pairs.empty()) return reported.why_not;
     played.word = Word::refused;
     const auto nominal = configuration::stated_at(configuration_, asked.profile, asked.level_db);
     if (!nominal) return fmt::format("found no [[profile]] of number {}", asked.profile);
     const auto taken = spectrum::take_controller_psd(
-        told.pairs,
-        {*nominal, told.measured_g_rms, drivers::to_seconds(ordered_.to - ordered_.from),
+        reported.pairs,
+        {*nominal, reported.measured_g_rms, drivers::to_seconds(ordered_.to - ordered_.from),
          configuration_.spectrum.controller_gain, with_.book.spectrum().psd_before});
     if (!taken.wrong.empty()) return taken.wrong;
     auto there = configuration::at_platform(configuration_, taken.psd);
@@ -54,7 +55,7 @@ std::string CampaignDwells::take_psd(const campaign::ToldPsd& told,
                "not reach, expected those of the profile";
     played.word = Word::good;
     played.random = there->random;
-    played.random.mean_square_g2 *= told.power_ratio;
+    played.random.mean_square_g2 *= reported.power_ratio;
     played.random.profile = asked.profile;
     played.random.level_db = asked.level_db;
     played.seen = there->seen;

@@ -189,8 +189,8 @@ void CampaignDwells::tell_verdict(const uncertainty::Assessment& assessed,
     if (!enough && !concluding_) return;
     const auto& verdict = assessed.verdict;
     const std::string first = verdict.reasons.empty() ? "" : verdict.reasons.front().code;
-    const std::string told = uncertainty::word_of(verdict.level) + (" " + first);
-    if (enough && std::exchange(verdict_told_, told) != told) {
+    const std::string newest = uncertainty::word_of(verdict.level) + (" " + first);
+    if (enough && std::exchange(verdict_logged_, newest) != newest) {
         const auto said =
             fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence);
         with_.events.log(severity_of(verdict.level), "fit", said);

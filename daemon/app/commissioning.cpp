@@ -133,7 +133,7 @@ CommandReply Commissioning::begin(const CommandRequest& request, const Json& wha
 }
 
 void Commissioning::attend(const std::string& by) {
-    if (procedure_) procedure_->attend(by, rt::wall_clock());
+    if (procedure_) procedure_->attend(by, rt::steady_now());
 }
 
 Time Commissioning::step(Time now) {
@@ -145,7 +145,7 @@ Time Commissioning::step(Time now) {
         return drivers::kNever;
     }
     rig_.take_increments();
-    const Time next = procedure_->step(now, rt::wall_clock());
+    const Time next = procedure_->step(now, rt::steady_now());
     if (!procedure_->active()) end(now);
     return next;
 }

@@ -28,18 +28,18 @@ void ControlLoop::take_attendance(CommandRequest& request) {
     if (arming_ || campaign_.checking()) return;
     attendance_.reset();
     if (!attended) return;
-    attendance_ = Attendance{request.by, rt::wall_clock()};
+    attendance_ = Attendance{request.by, rt::steady_now()};
 }
 
 void ControlLoop::watch_attendance(Time now) {
     if (!attendance_) return;
     if (arming_) {  // it is being written to disk, and its tool waits for that
-        attendance_->wall = rt::wall_clock();
+        attendance_->steady = rt::steady_now();
         return;
     }
     if (!campaign_.checking()) return attendance_.reset();
     constexpr Time kAbsent = commission::Procedure::kAbsent;
-    if (rt::wall_clock() - attendance_->wall <= kAbsent) return;
+    if (rt::steady_now() - attendance_->steady <= kAbsent) return;
     const std::string by = attendance_->by;
     attendance_.reset();
     static_cast<void>(campaign_.command(

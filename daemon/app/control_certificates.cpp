@@ -63,14 +63,14 @@ void ControlLoop::begin_certificate(WaitingCommand waiting) {
     numbers.push_back(issued.number);
     log(Severity::info, "certificate",
         fmt::format("{} issued by {}", issued.number, waiting.request.by));
-    certifying_.push_back({std::move(waiting), reply, entry, rt::wall_clock()});
+    certifying_.push_back({std::move(waiting), reply, entry, rt::steady_now()});
 }
 
 /// The PDF is given away once its hash is on disk.
 void ControlLoop::finish_certificates(bool at_once) {
     std::erase_if(certifying_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
-            if (!at_once && rt::wall_clock() - one.since_wall < kJournalPatience) return false;
+            if (!at_once && rt::steady_now() - one.since_steady < kJournalPatience) return false;
             one.reply = {false, "the journal has not written it yet: the number is used up"};
         }
         one.waiting.reply.set_value(one.reply);

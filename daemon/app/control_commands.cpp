@@ -52,7 +52,7 @@ void ControlLoop::take_commands(Time now) {
                 answer(waiting, reply);
             else
                 acknowledging_.push_back({std::move(waiting), std::move(reply),
-                                          entry_of_acknowledgement_, rt::wall_clock()});
+                                          entry_of_acknowledgement_, rt::steady_now()});
         } else {
             const auto guarded = outside_.refuses(waiting.request);
             answer(waiting, guarded.empty() ? campaign_.command(waiting.request, now)
@@ -136,13 +136,13 @@ void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
         return answer(waiting, reply);
     }
     const auto entry = journal_->armed(waiting.request.by, campaign_.arming_text(waiting.request));
-    arming_.emplace(Arming{std::move(waiting), entry, rt::wall_clock()});
+    arming_.emplace(Arming{std::move(waiting), entry, rt::steady_now()});
 }
 
 void ControlLoop::finish_arming(Time now) {
     if (!arming_) return;
     if (!journal_->on_disk(arming_->entry)) {
-        if (rt::wall_clock() - arming_->since_wall < kDiskPatience) return;
+        if (rt::steady_now() - arming_->since_steady < kDiskPatience) return;
         const auto status = journal_->status();
         return give_up_arming(
             fmt::format("the journal has not written the arming within {:g} s: {}",
@@ -174,7 +174,7 @@ void ControlLoop::give_up_arming(const std::string& why) {
 void ControlLoop::finish_acknowledging(bool at_once) {
     std::erase_if(acknowledging_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
-            if (!at_once && rt::wall_clock() - one.since_wall < kDiskPatience) return false;
+            if (!at_once && rt::steady_now() - one.since_steady < kDiskPatience) return false;
             one.reply.message +=
                 "; the journal has not written it yet: after a restart it may have to be said "
                 "again";
@@ -232,7 +232,7 @@ void ControlLoop::watch_emergency_stop(Time now) {
     if (emergency_was_open_ == open) return;
     const bool at_start = !emergency_was_open_;
     const bool tripped = latches_.tripped();
-    // Its own row trips, or has tripped and is told next.
+    // Its own row trips, or has tripped and is reported next.
     if (open && !tripped && (interlock_.latched() || !campaign_.armed_by().empty())) return;
     emergency_was_open_ = open;
     const char* const name = rt::condition_of(rt::Trip::emergency_stop).name;
@@ -321,7 +321,7 @@ CommandReply ControlLoop::acknowledge(const CommandRequest& request, Time now) {
 }
 
 std::string ControlLoop::tell_overdue() {
-    std::string told;
+    std::string overdue;
     const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     const std::string day = fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
     for (const auto& instrument : configuration_.paperwork.instruments) {
@@ -329,9 +329,9 @@ std::string ControlLoop::tell_overdue() {
         const auto words = fmt::format("{} {}: certificate {} was due on {}", instrument.name,
                                        instrument.serial, instrument.certificate, instrument.due);
         log(Severity::warning, "paperwork", words);
-        told += "; warning: " + words;
+        overdue += "; warning: " + words;
     }
-    return told;
+    return overdue;
 }
 
 }  // namespace vibrig

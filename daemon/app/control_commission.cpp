@@ -15,7 +15,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const std::string word = what["do"];
     if (word == "attend") {
         if (attendance_ && journal::same_person(request.by, attendance_->by))
-            attendance_->wall = rt::wall_clock();
+            attendance_->steady = rt::steady_now();
         return waiting.reply.set_value({true, "there"});
     }
     if (word == "read") {  // several times a second: no row of the audit

@@ -197,12 +197,12 @@ CommandReply ControlLoop::command(const CommandRequest& request) {
         reply = commands_.emplace_back(WaitingCommand{request, {}, abandoned}).reply.get_future();
         control_waiter_->notify();
     }
-    // Whoever stops is told within 0.2 s that the stop is on its way, whatever holds the rest up.
+    // A stop is answered within 0.2 s, that it is on its way, whatever holds the rest up.
     // It is not taken back: the campaign ends when the control thread goes on.
     constexpr auto kStopPatience = std::chrono::milliseconds(100);
     if (request.kind == CommandRequest::Kind::abort) {
         if (reply.wait_for(kStopPatience) == std::future_status::ready) return reply.get();
-        return {true, "the shaker is told to stop; the campaign has not ended yet"};
+        return {true, "the shaker is ordered to stop; the campaign has not ended yet"};
     }
     if (reply.wait_for(std::chrono::seconds(5)) != std::future_status::ready &&
         !abandoned->exchange(true)) {

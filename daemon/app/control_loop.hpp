@@ -64,7 +64,7 @@ class ControlLoop {
         events_.log(severity, source, text);
     }
     void show(drivers::Time now);
-    /// Of what is armed, peak at the table; 0: nothing is.
+    /// The highest level that is armed, peak at the table; 0: nothing is.
     [[nodiscard]] double highest_level() const;
     void watch_outside();
     void record_begin(const std::string& by, std::size_t dwells_before);
@@ -164,19 +164,19 @@ class ControlLoop {
 
     commission::Book book_{loaded_};
     Commissioning commissioning_{parts_, outside_, book_};
-    /// Of a proof that a tool waits for: it ends with the tool.
+    /// Who waits for a proof with a tool: the proof ends with the tool.
     struct Attendance {
         std::string by;
-        drivers::Time wall = 0;  ///< when the tool was last there
+        drivers::Time steady = 0;  ///< when the tool was last there
     };
     std::optional<Attendance> attendance_;
-    std::string device_;            ///< who the shaker's controller says it is; empty: not known
+    std::string device_;  ///< the identity that the shaker's controller reports; empty: not known
     std::size_t proofs_taken_ = 0;  ///< into the record, of the campaign's
     /// An arming that the journal is writing.
     struct Arming {
         WaitingCommand waiting;
         std::uint64_t entry = 0;
-        drivers::Time since_wall = 0;
+        drivers::Time since_steady = 0;
     };
     std::optional<Arming> arming_;
     /// What was acknowledged and is not answered yet: "acknowledged" outlives a power cut.
@@ -184,7 +184,7 @@ class ControlLoop {
         WaitingCommand waiting;
         CommandReply reply;
         std::uint64_t entry = 0;
-        drivers::Time since_wall = 0;
+        drivers::Time since_steady = 0;
     };
     std::vector<Acknowledging> acknowledging_;
     std::vector<Acknowledging> certifying_;       ///< certificates that are not answered yet

@@ -17,7 +17,7 @@ std::int64_t utc_now() {
 
 void Events::log(Severity severity, const std::string& source, const std::string& text) {
     enter(severity, source, text);
-    // A pager that fails is not told so by itself; of a fit whoever looks in the morning reads.
+    // No page about a pager that fails; a fit can wait until somebody reads the log.
     if (severity == Severity::alarm && source != "annunciator" && source != "fit")
         announce(drivers::HornPattern::alarm, text);
 }

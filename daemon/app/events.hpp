@@ -30,7 +30,7 @@ class Events {
     void page_by(drivers::Annunciator* annunciator) noexcept { annunciator_.store(annunciator); }
 
     void log(Severity severity, const std::string& source, const std::string& text);
-    /// The same, and no pager is told.
+    /// The same without the pager.
     void enter(Severity severity, const std::string& source, const std::string& text);
     /// What is reported there is logged as of `source`; for as long as this lives.
     [[nodiscard]] EventSink sink(std::string source);

@@ -42,7 +42,7 @@ class Outside {
     void fill(StatusData& status) const;
 
   private:
-    /// What vibrig-guard is told of this daemon; its link's thread.
+    /// What vibrig-guard gets of this daemon; its link's thread.
     [[nodiscard]] proto::DaemonWord word();
     void show(bool tripped, bool alarm);
 

@@ -100,7 +100,7 @@ struct Parts {
     rt::ThreadSetup acquisition_setup, estimator_setup;
 };
 
-/// What the recorder is told of a campaign that begins.
+/// What the recorder is given of a campaign that begins.
 [[nodiscard]] record::Head recording_head(Parts& parts, const std::string& by,
                                           std::size_t dwells_before);
 /// Around the measurement, as it is now; what is commanded, g at the table and Hz. Any thread.

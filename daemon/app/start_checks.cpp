@@ -139,26 +139,26 @@ void check_certificates(const configuration::Loaded& loaded) {
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {
     const campaign::Settings& campaign = configuration.campaign;
-    std::vector<std::string> told;
+    std::vector<std::string> warnings;
     const auto& rig = configuration.estimator;
     if (rig.encoder_sign != std::array{1, 1, 1} ||
         rig.encoder_zero_deg != std::array{0.0, 0.0, 0.0})
-        told.emplace_back(
+        warnings.emplace_back(
             "positions of lists and plans are gimbal angles, converted by platform.encoder_sign "
             "and encoder_zero_deg: a file that states what the encoders show is to be mended");
     // Of a plan file and of an adaptive campaign the forecast tells.
-    if (!campaign.stops.empty() || campaign.adaptive) return told;
+    if (!campaign.stops.empty() || campaign.adaptive) return warnings;
     for (auto& line : estimator::plan_warnings(
              estimator::report_plan(rig,
                                     estimator::campaign_plan(rig, campaign.positions_deg,
                                                              campaign.table_g, campaign.dwell_s),
                                     drivers::to_seconds(configuration.assembler.sample_period))))
-        told.push_back(std::move(line));
+        warnings.push_back(std::move(line));
     const std::string alias = estimator::VibrationLevel::aliasing(
         rig.frequency_hz, drivers::to_seconds(configuration.assembler.sample_period),
         rig.level_window_s);
-    if (!alias.empty()) told.push_back("vibration.frequency_hz: " + alias);
-    return told;
+    if (!alias.empty()) warnings.push_back("vibration.frequency_hz: " + alias);
+    return warnings;
 }
 
 }  // namespace vibrig

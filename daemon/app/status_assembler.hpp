@@ -22,7 +22,7 @@ class StatusAssembler {
   private:
     [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
                                                   const rt::EstimatorView& estimated) const;
-    /// Of what the status has already.
+    /// Made from what the status has already.
     [[nodiscard]] VibrationStatus vibration(const StatusData& status) const;
     [[nodiscard]] InterlockStatus interlock_status(std::vector<Latch> latches) const;
 

@@ -58,10 +58,10 @@ void Supervisor::check_balance(Time now) {
 
 void Supervisor::tell_clock_misfit() {
     auto found = fitness_.clock_misfit();
-    if (found == misfit_told_) return;
+    if (found == misfit_logged_) return;
     log(found.empty() ? Severity::info : Severity::alarm, "clock",
         found.empty() ? "rig and daemon agree on the time" : found);
-    misfit_told_ = std::move(found);
+    misfit_logged_ = std::move(found);
 }
 
 std::string Supervisor::stuck_stage() {
@@ -121,7 +121,7 @@ void Supervisor::tell_alarms() {
 void Supervisor::tell_controller() {
     using drivers::ControllerState;
     const auto now = port_->counters().controller;
-    if (std::exchange(controller_told_, now) == now) return;
+    if (std::exchange(controller_logged_, now) == now) return;
     log(now == ControllerState::active    ? Severity::info
         : now == ControllerState::warning ? Severity::warning
                                           : Severity::alarm,
@@ -150,9 +150,9 @@ void Supervisor::tell_watchdog() {
 }
 
 void Supervisor::watch_onlookers() {
-    const auto served = serving_wall_ns_.load();
+    const auto served = serving_steady_ns_.load();
     interlock_.onlookers(recorder_ && recorder_->degraded(),
-                         served != 0 && rt::wall_clock() - served > kServerPatience);
+                         served != 0 && rt::steady_now() - served > kServerPatience);
 }
 
 void Supervisor::tell_log() {

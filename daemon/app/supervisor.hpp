@@ -34,7 +34,7 @@ class Supervisor {
     /// The shaker's thread: everybody goes on, and nobody stops the table.
     [[nodiscard]] bool may_feed() const noexcept;
     /// The server's thread: it has taken a status.
-    void served() noexcept { serving_wall_ns_.store(rt::wall_clock()); }
+    void served() noexcept { serving_steady_ns_.store(rt::steady_now()); }
     /// Any thread: how far the control thread is.
     [[nodiscard]] std::uint64_t control_mark() const noexcept {
         return static_cast<std::uint64_t>(control_beat_.load());
@@ -69,17 +69,17 @@ class Supervisor {
     const CampaignRig& rig_ = parts_.rig;
     const campaign::Campaign& campaign_ = parts_.campaign;
 
-    // As last told.
+    // As last logged.
     std::array<bool, rt::kMostRules> raised_{};
-    drivers::ControllerState controller_told_ = drivers::ControllerState::active;
+    drivers::ControllerState controller_logged_ = drivers::ControllerState::active;
     bool watchdog_was_changed_ = false, journal_was_running_ = true, recorder_was_stuck_ = false,
          log_was_blocked_ = false;
     std::string imbalance_;
     drivers::Time balance_checked_ = 0;
-    std::string misfit_told_;  ///< thread of stuck_stage()
+    std::string misfit_logged_;  ///< thread of stuck_stage()
 
     std::atomic<drivers::Time> control_beat_{0};
-    std::atomic<std::int64_t> serving_wall_ns_{0};  ///< 0: there is no server
+    std::atomic<std::int64_t> serving_steady_ns_{0};  ///< 0: there is no server
     /// How far each stage was when it last went on, for stuck_stage().
     struct Progress {
         std::uint64_t mark = 0;

@@ -73,7 +73,7 @@ void check_again(const std::string& path) {
     }
 }
 
-/// Whether an upgrade has asked for a restart and may have it now. Why it has to wait is told
+/// Whether an upgrade has asked for a restart and may have it now. Why it has to wait is logged
 /// whenever that changes.
 bool starts_again(const vibrig::Daemon& daemon, std::string& waits_for) {
     static const std::string request = vibrig::restart_request_file();
@@ -95,7 +95,7 @@ bool starts_again(const vibrig::Daemon& daemon, std::string& waits_for) {
 /// ends the daemon, or 0: it is to be started again.
 int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig::RigLock& lock,
           const sigset_t& signals, const std::string& path) {
-    std::string told, stuck, waits_for;
+    std::string reported, stuck, waits_for;
     for (;;) {
         const double period_s = manager.period_s() > 0 ? std::min(1.0, manager.period_s()) : 1.0;
         timespec wait{};
@@ -106,7 +106,7 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig:
         if (signal == SIGHUP) {
             manager.reloading();
             check_again(path);
-            manager.ready(told);
+            manager.ready(reported);
             continue;
         }
         if (signal > 0) return signal;
@@ -117,9 +117,9 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig:
         if (stuck.empty()) manager.alive();
         if (starts_again(daemon, waits_for)) return 0;
         if (auto words = stuck.empty() ? words_of(daemon.status()) : "no progress in " + stuck;
-            words != told) {
-            told = std::move(words);
-            manager.status(told);
+            words != reported) {
+            reported = std::move(words);
+            manager.status(reported);
         }
     }
 }
@@ -143,7 +143,7 @@ class LogEnd {
 int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
         const sigset_t& signals, const std::string& path) {
     const vibrig::ServiceManager manager;
-    // Before anything is opened, and long before anything is told to stop.
+    // Before anything is opened, and long before anything is ordered to stop.
     vibrig::RigLock lock(loaded.configuration, path);
     // What an upgrade asked of the daemon before this one.
     if (const auto request = vibrig::restart_request_file(); !request.empty())

@@ -4,7 +4,7 @@
 
 namespace vibrig {
 
-/// What the service manager is told; nothing happens without one (sd_notify(3)).
+/// Reports to the service manager; nothing happens without one (sd_notify(3)).
 class ServiceManager {
   public:
     ServiceManager();

@@ -97,7 +97,7 @@ class Campaign {
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
     void on_dwell_done(const estimator::DwellSummary& summary);
-    /// What was played in the dwell done last is still to be told: Dwells::played().
+    /// What was played in the newest dwell is still to be read: Dwells::played().
     [[nodiscard]] bool psd_awaited() const { return psd_due_; }
     /// An interlock has ordered the stop; latches until acknowledged.
     void on_trip(const std::string& cause, drivers::Time now);
@@ -107,13 +107,13 @@ class Campaign {
     [[nodiscard]] bool done(drivers::Time now) const;
     /// Any thread: a stop is ordered and rest not measured since. Nobody feeds the watchdog then.
     [[nodiscard]] bool stopping() const noexcept { return stop_.stopping(); }
-    /// What is not at rest, or cannot be told to be; empty: nothing.
+    /// What is not at rest, or not known to be; empty: nothing.
     [[nodiscard]] std::string what_moves(drivers::Time now) const { return stop_.what_moves(now); }
     void fill(StatusData& status, drivers::Time now) const;
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     [[nodiscard]] const SafetyProof& proof() const { return proof_; }
-    /// Who the shaker's controller says it is.
+    /// The identity that the shaker's controller reports.
     void shaker_is(const std::string& device) { proof_.device_is(device); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
@@ -172,7 +172,7 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_move(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_open(drivers::Time now) const;
     CommandReply begin_rest_check(const CommandRequest& request, drivers::Time now);
-    void conclude_rest_check(const std::string& refused, const std::string& told,
+    void conclude_rest_check(const std::string& refused, const std::string& warned,
                              const std::vector<std::string>& suspects, drivers::Time now);
     void begin_opening(drivers::Time now);
     drivers::Time open(drivers::Time now);
@@ -192,8 +192,8 @@ class Campaign {
     void next_position(drivers::Time now);
     // campaign_psd.cpp
     [[nodiscard]] bool asks_for_psd(const estimator::DwellSummary& summary) const;
-    [[nodiscard]] bool psd_told(drivers::Time now);
-    void close_psd(ToldPsd told);
+    [[nodiscard]] bool psd_settled(drivers::Time now);
+    void close_psd(ReportedPsd reported);
     void count_rejected(const estimator::DwellSummary& summary);
     void start_position(drivers::Time now);
     void abort(const std::string& why, drivers::Time now);
@@ -243,11 +243,11 @@ class Campaign {
     enum class Choice : std::uint8_t { more, end, thinking };
     /// At rest: whether there is one more stop.
     [[nodiscard]] Choice choose_next(drivers::Time now);
-    /// Of the campaign, s, a life before a restart included.
+    /// Time that the campaign has used, s, a life before a restart included.
     [[nodiscard]] double used_s(drivers::Time now) const {
         return used_before_s_ + drivers::to_seconds(now - started_);
     }
-    /// Of one position, from levelling to rest.
+    /// Time of one position, from levelling to rest.
     [[nodiscard]] double nominal_stop_s() const {
         return times_.levelling_s + times_.look_s + settings_.dwell_s + settings_.settle_s +
                2 * settings_.ramp_s;
@@ -277,7 +277,7 @@ class Campaign {
     int repeats_ = 0;  ///< of the present stop, after flagged dwells
     std::string armed_by_;
     std::string armed_for_, started_by_;
-    drivers::Time armed_wall_ = 0;  ///< when it was armed, in people's time
+    drivers::Time armed_steady_ = 0;  ///< when it was armed, by the steady clock
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
@@ -303,14 +303,14 @@ class Campaign {
     std::shared_ptr<Opening> opening_;
     Stage* stage_ = nullptr;          ///< of them the one under way
     drivers::Time second_from_ = -1;  ///< the newest second that was judged
-    bool gravity_told_ = false;
+    bool gravity_warned_ = false;
     drivers::Time vibration_off_since_ = -1;  ///< -1: it is vertical
     std::string vibration_off_;               ///< in words, and nothing done about it yet
     int rejected_in_a_row_ = 0;               ///< dwells, the newest included
     std::string rejected_for_;
     std::optional<Doubt> doubted_;  ///< and nothing done about it yet
     SafetyProof proof_;
-    /// A random dwell that is over, until the controller has said what it played.
+    /// A random dwell that is over, until the controller has reported what it played.
     struct Unread {
         estimator::DwellInfo info;
         StopDone stop;
@@ -327,7 +327,7 @@ class Campaign {
     RestCheckStatus rest_check_;
     drivers::Time torque_sent_ = 0;
     std::string mark_;  ///< why the campaign is marked
-    /// Of each dwell in which zeros were in force: run, and variance of the relative level.
+    /// Run, and variance of the relative level, of each dwell in which zeros were in force.
     std::vector<std::pair<int, double>> level_variances_;
 };
 

@@ -28,12 +28,13 @@ std::string duration_text(double seconds) {
 template <typename Stops>
 std::string profiles_text(const Stops& stops) {
     std::string profiles;
-    std::vector<std::uint16_t> told;
+    std::vector<std::uint16_t> listed;
     for (const auto& [stop, run, position] : stops) {
-        if (!stop.random || std::ranges::find(told, stop.random->set_point.profile) != told.end())
+        if (!stop.random ||
+            std::ranges::find(listed, stop.random->set_point.profile) != listed.end())
             continue;
         const auto& point = stop.random->set_point;
-        told.push_back(point.profile);
+        listed.push_back(point.profile);
         double highest_g = 0;
         for (const auto& other : stops) {
             if (other.stop.kind() == stop.kind())
@@ -50,13 +51,13 @@ std::string profiles_text(const Stops& stops) {
 /// " at 15, 85.1 Hz"; of a campaign that shakes with no sine nothing.
 template <typename Stops>
 std::string frequencies_text(const Stops& stops, double reference_hz) {
-    std::set<double> told;
+    std::set<double> listed;
     for (const auto& [stop, run, position] : stops) {
         if (stop.random || stop.sweep.any() || stop.table_g <= 0) continue;
-        told.insert(stop.frequency_hz > 0 ? stop.frequency_hz : reference_hz);
+        listed.insert(stop.frequency_hz > 0 ? stop.frequency_hz : reference_hz);
     }
     std::string text;
-    for (const double hz : told) text += fmt::format("{}{:g}", text.empty() ? " at " : ", ", hz);
+    for (const double hz : listed) text += fmt::format("{}{:g}", text.empty() ? " at " : ", ", hz);
     return text.empty() ? text : text + " Hz";
 }
 
@@ -165,7 +166,7 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
 /// Nobody started it: whoever armed may long have gone home.
 void Campaign::watch_arming(Time now) {
     if (state_ != State::armed ||
-        ports_.log.wall() - armed_wall_ < drivers::from_seconds(settings_.arming_valid_s)) {
+        ports_.log.steady_now() - armed_steady_ < drivers::from_seconds(settings_.arming_valid_s)) {
         return;
     }
     ports_.log.event(

@@ -24,7 +24,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (const auto why = not_fit_to_arm(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             excitation_.armed();
-            armed_wall_ = ports_.log.wall();
+            armed_steady_ = ports_.log.steady_now();
             reason_.clear();
             enter(State::armed, now);
             armed_for_ = arming_text(request);
@@ -73,7 +73,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
 
 CommandReply Campaign::acknowledge(const CommandRequest& request, Time now) {
     // One acknowledgement is for both: the controller latches its faults, too, and forgets
-    // them when it is told to stop at rest.
+    // them when it is ordered to stop at rest.
     if (const auto why = not_fit_to_acknowledge(now); !why.empty()) return {false, why};
     const auto shaker = ports_.rig.shaker.reading();
     const bool changed = shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;

@@ -129,7 +129,7 @@ Time Campaign::rest(Time now) {
         end(State::aborted, "the daemon is shutting down", now);
         return now;
     }
-    if (psd_due_ && !psd_told(now)) return now + kStagePoll;
+    if (psd_due_ && !psd_settled(now)) return now + kStagePoll;
     repeat_doubted();
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);

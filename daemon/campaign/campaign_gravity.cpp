@@ -1,4 +1,4 @@
-// What the table is told, and what is held against encoders and dwells before it is told to move.
+// What is commanded, and what is held against encoders and dwells before the table may move.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ void Campaign::watch_gravity() {
         for (std::size_t i = 0; i < 3; ++i) zero_g[i] += found[i];
     }
     const auto verdict = gravity_->judge(second, zero_g, !stop_.excited());
-    if (!verdict.vibration_told) {
+    if (!verdict.vibration_off) {
         vibration_off_since_ = -1;
     } else if (vibration_off_since_ < 0) {
         vibration_off_since_ = second.from;
@@ -51,9 +51,10 @@ void Campaign::watch_gravity() {
         vibration_off_ = gravity_->vibration_words();
         if (first) ports_.log.event(Severity::alarm, vibration_off_);
     }
-    if (std::exchange(gravity_told_, verdict.told) == verdict.told) return;
-    ports_.log.event(verdict.told ? Severity::alarm : Severity::info,
-                     verdict.told ? gravity_->words() : "gravity is where the encoders say again");
+    if (std::exchange(gravity_warned_, verdict.warned) == verdict.warned) return;
+    ports_.log.event(
+        verdict.warned ? Severity::alarm : Severity::info,
+        verdict.warned ? gravity_->words() : "gravity is where the encoders say again");
 }
 
 bool Campaign::vibration_was_off(Time now) {
@@ -79,10 +80,11 @@ bool Campaign::gravity_holds(Time now) {
 bool Campaign::too_many_rejected(Time now) {
     if (rejected_in_a_row_ < settings_.rejected_in_a_row) return false;
     const auto suspects = gravity_->suspects();
-    pause_at_rest(fmt::format("{} dwells in a row rejected, the last: {}{}",
-                              std::exchange(rejected_in_a_row_, 0), rejected_for_,
-                              gravity_->newest().told && !suspects.empty() ? "; " + suspects : ""),
-                  now);
+    pause_at_rest(
+        fmt::format("{} dwells in a row rejected, the last: {}{}",
+                    std::exchange(rejected_in_a_row_, 0), rejected_for_,
+                    gravity_->newest().warned && !suspects.empty() ? "; " + suspects : ""),
+        now);
     return true;
 }
 

@@ -22,33 +22,33 @@ bool Campaign::asks_for_psd(const estimator::DwellSummary& summary) const {
 }
 
 /// At rest. True: it is known, or is not to be had.
-bool Campaign::psd_told(Time now) {
+bool Campaign::psd_settled(Time now) {
     if (!unread_) return true;
     drivers::Shaker& shaker = ports_.rig.shaker;
-    ToldPsd told{{}, {}, unread_->measured_g_rms, unread_->power_ratio};
+    ReportedPsd reported{{}, {}, unread_->measured_g_rms, unread_->power_ratio};
     if (unread_->request == 0) {
         unread_->request = shaker.read_psd();
         unread_->until = now + kPsdPatience;
-        if (unread_->request == 0) told.why_not = "there are no registers of it";
+        if (unread_->request == 0) reported.why_not = "there are no registers of it";
     } else if (auto psd = shaker.psd(); psd.request == unread_->request) {
-        told.pairs = std::move(psd.pairs);
-        told.why_not = std::move(psd.why_not);
+        reported.pairs = std::move(psd.pairs);
+        reported.why_not = std::move(psd.why_not);
     } else if (now > unread_->until) {
-        told.why_not = "no answer within 15 s";
+        reported.why_not = "no answer within 15 s";
     }
-    if (told.pairs.empty() && told.why_not.empty()) return false;
-    close_psd(std::move(told));
+    if (reported.pairs.empty() && reported.why_not.empty()) return false;
+    close_psd(std::move(reported));
     return true;
 }
 
-void Campaign::close_psd(ToldPsd told) {
+void Campaign::close_psd(ReportedPsd reported) {
     psd_due_ = false;
-    const Played played = ports_.dwells.played(told);
+    const Played played = ports_.dwells.played(reported);
     if (played.summary.samples > 0) dwells_.back() = played.summary;
     count_rejected(dwells_.back());
     if (!unread_) return;
     unread_->info.played = played.random;
-    unread_->stop.psd = std::move(told.pairs);
+    unread_->stop.psd = std::move(reported.pairs);
     ports_.log.position_done(unread_->info, dwells_.back(), unread_->stop);
     unread_.reset();
 }

@@ -22,11 +22,12 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.armed_by = armed_by_;
     status.started_by = started_by_;
     status.armed_for = armed_by_.empty() ? std::string() : armed_for_;
-    status.arming_left_s = state_ == State::armed
-                               ? std::max(settings_.arming_valid_s -
-                                              drivers::to_seconds(ports_.log.wall() - armed_wall_),
-                                          1e-3)
-                               : 0;
+    status.arming_left_s =
+        state_ == State::armed
+            ? std::max(settings_.arming_valid_s -
+                           drivers::to_seconds(ports_.log.steady_now() - armed_steady_),
+                       1e-3)
+            : 0;
     status.resume_offer = resume_offer();
     status.runs = static_cast<int>(runs());
     status.positions = static_cast<int>(positions());

@@ -13,7 +13,7 @@
 namespace vibrig::campaign {
 
 /// What is asked of the shaker under an arming: levels, ramps down, stops, and whether it does what
-/// it was told. Whoever watches the table is told the same. Control thread only.
+/// was commanded. The witnesses of the table get the same. Control thread only.
 class Excitation {
   public:
     Excitation(const Settings& settings, Rig& rig, StopMonitor& stop)
@@ -27,7 +27,7 @@ class Excitation {
         highest_g_ = highest_g;
         campaign_ = campaign;
     }
-    /// From rest, where the gimbals are (deg): what the table was told last is over, and no witness
+    /// From rest, where the gimbals are (deg): what was commanded last is over, and no witness
     /// may hold it to that.
     void from_rest(const Stop& stop, drivers::Time now);
     /// Platform over table at a frequency, as the loop check has measured it.
@@ -46,7 +46,7 @@ class Excitation {
     [[nodiscard]] const estimator::SweptSine& sweep() const { return sweep_; }
     /// It has begun then, and goes so fast: the witnesses go with it.
     void follow(drivers::Time begun, double octaves_per_s, drivers::Time now);
-    /// The controller has been told this kind of vibration already, by what it reads back.
+    /// By its read-back the controller has this kind of vibration set already.
     [[nodiscard]] bool chosen() const;
 
     /// A part begins in which one thing is asked for at most: its time counts from here.
@@ -67,7 +67,7 @@ class Excitation {
     [[nodiscard]] std::string climb(double table_g, drivers::Time now, bool& reached);
 
     enum class Rests : std::uint8_t { not_yet, at_rest, overdue };
-    /// Ramps down until rest is measured; overdue is told once.
+    /// Ramps down until rest is measured; overdue is reported once.
     [[nodiscard]] Rests come_to_rest(drivers::Time now);
 
     /// A stop of this thread's own, which does not end the arming.
@@ -102,7 +102,7 @@ class Excitation {
     double frequency_hz_;
     std::optional<RandomStop> random_;
     estimator::SweptSine sweep_{};
-    rt::Sweep follows_{};                ///< as the witnesses were told of it
+    rt::Sweep follows_{};                ///< as the witnesses have it
     double transmission_ = 0;            ///< see Stop
     std::map<double, double> measured_;  ///< transmissions by frequency, as measured
     double highest_g_ = 0;

@@ -48,10 +48,10 @@ GravityWatch::Verdict GravityWatch::judge(const rt::MeanMotion& second, const Ve
         newest_.vibration_g < limits_.vibration_g
             ? 0
             : std::atan2(std::sqrt(std::max(power - along * along, 0.0)), along) * kDegPerRad;
-    newest_.vibration_told = !(newest_.vibration_deg <= limits_.vibration_deg);
+    newest_.vibration_off = !(newest_.vibration_deg <= limits_.vibration_deg);
     const bool size = !at_rest || std::abs(newest_.size_g - 1) <= limits_.size;
-    newest_.size_told = !size;
-    newest_.told = !(newest_.angle_deg <= limits_.told_deg) || !size;
+    newest_.size_off = !size;
+    newest_.warned = !(newest_.angle_deg <= limits_.warn_deg) || !size;
     newest_.refused = !(newest_.angle_deg <= limits_.refused_deg) || !size;
     if (std::exchange(fresh_, false) || looks_.empty()) {
         looks_.push_back({});
@@ -63,14 +63,14 @@ GravityWatch::Verdict GravityWatch::judge(const rt::MeanMotion& second, const Ve
 
 std::string GravityWatch::words() const {
     return fmt::format(
-        "gravity {:.2f} deg off what the encoders say (told beyond {:g}, no ramp beyond {:g} deg), "
+        "gravity {:.2f} deg off what the encoders say (warned above {:g}, no ramp above {:g} deg), "
         "{:.3f} g (1 within {:g})",
-        newest_.angle_deg, limits_.told_deg, limits_.refused_deg, newest_.size_g, limits_.size);
+        newest_.angle_deg, limits_.warn_deg, limits_.refused_deg, newest_.size_g, limits_.size);
 }
 
 std::string GravityWatch::vibration_words() const {
     return fmt::format(
-        "the vibration of {:.2f} g is {:.1f} deg off the vertical by the encoders (told beyond "
+        "the vibration of {:.2f} g is {:.1f} deg off the vertical by the encoders (warned above "
         "{:g} "
         "deg): motion across it, or an accelerometer that follows gravity and not the vibration",
         newest_.vibration_g, newest_.vibration_deg, limits_.vibration_deg);
@@ -85,7 +85,7 @@ double GravityWatch::worst_deg(const estimator::Settings& rig) const {
 }
 
 void GravityWatch::consider(Suspects& found, double worst, std::string words) const {
-    if (worst <= limits_.told_deg) found.emplace_back(worst, std::move(words));
+    if (worst <= limits_.warn_deg) found.emplace_back(worst, std::move(words));
 }
 
 void GravityWatch::consider_encoder(Suspects& found, std::size_t gimbal) const {
@@ -150,7 +150,7 @@ void GravityWatch::consider_up(Suspects& found) const {
 
 std::string GravityWatch::suspects() const {
     // What turns or swaps axes leaves the size as it is.
-    if (newest_.size_told)
+    if (newest_.size_off)
         return "suspects, by the size of gravity: accelerometer.zero_g; accelerometer.matrix";
     Suspects found;
     for (std::size_t gimbal = 0; gimbal < 3; ++gimbal) consider_encoder(found, gimbal);

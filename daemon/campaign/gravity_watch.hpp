@@ -10,14 +10,14 @@
 
 namespace vibrig::campaign {
 
-/// Of the angle between the vertical by the encoders and the mean force, and of that force's size.
+/// Limits of the angle between the vertical by the encoders and the mean force, and of its size.
 struct GravityLimits {
-    double told_deg = 0.2;
+    double warn_deg = 0.2;
     double refused_deg = 0.5;
     double size = 0.02;  ///< of 1 g, at rest
-    /// Of the vibration against the vertical by the encoders, from so much on, peak. Motion across
-    /// the vertical of a quarter of that along it, which the identification accounts for, is 14
-    /// deg.
+    /// Limit of the vibration against the vertical by the encoders, from so much on, peak. Motion
+    /// across the vertical of a quarter of that along it, which the identification accounts for, is
+    /// 14 deg.
     double vibration_deg = 15, vibration_g = 0.3;
 };
 
@@ -30,10 +30,10 @@ class GravityWatch {
     struct Verdict {
         bool known = false;
         double angle_deg = 0, size_g = 1;
-        bool told = false, refused = false;
-        bool size_told = false;  ///< it is the size that is wrong, or that as well
+        bool warned = false, refused = false;
+        bool size_off = false;  ///< it is the size that is wrong, or that as well
         double vibration_g = 0, vibration_deg = 0;  ///< peak; off the vertical, 0 when too small
-        bool vibration_told = false;
+        bool vibration_off = false;
     };
     /// A new position: it is remembered apart from the earlier ones.
     void next_position() noexcept { fresh_ = true; }

@@ -15,7 +15,7 @@ namespace vibrig::campaign {
 /// are still what the loop check found at this frequency, window by window. Control thread only.
 class InStepWatch {
   public:
-    /// Of readings that count; docs/theory/spectrum.md has what noise does to one window.
+    /// The time of readings that count; docs/theory/spectrum.md has what noise does to one window.
     static constexpr double kWindow_s = 5;
 
     /// `limits`: times what was found, of motion in step and across, beyond which it is said.
@@ -42,8 +42,8 @@ class InStepWatch {
     std::vector<estimator::LoopReading> window_;
 };
 
-/// Of those found that which a vibration at `hz` is held against: the reference frequency's too
-/// where `hz` stands for it. Nothing: the loop check has not looked there.
+/// Among those found the one that a vibration at `hz` is held against: the reference frequency's
+/// too where `hz` stands for it. Nothing: the loop check has not looked there.
 [[nodiscard]] std::optional<FoundInStep> found_at(const std::vector<FoundInStep>& found, double hz,
                                                   const estimator::Settings& rig);
 

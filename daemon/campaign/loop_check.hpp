@@ -58,10 +58,10 @@ class LoopCheck {
     /// While the level is still coming up, linearly over `ramp_s` from when it was asked for: table
     /// (platform over the transmission, where it has no accelerometer) over command; 0: unknown.
     [[nodiscard]] double over_command(drivers::Time asked, double ramp_s) const;
-    /// Of those that count, what is not older.
+    /// Readings that count and are not older than `time`.
     [[nodiscard]] std::span<const estimator::LoopReading> readings_since(drivers::Time time) const;
-    /// Judges it, `shaker_g` being what the controller says of the table: that is held against the
-    /// command as the accelerometers are, and is no witness of them.
+    /// Judges it, `shaker_g` being what the controller reports of the table: that is held against
+    /// the command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);
     /// The same at another frequency, where the platform is to do from `low` to `high` times what
     /// the table does; before finish(), whose verdict it is part of.

@@ -29,11 +29,11 @@ struct Next {
     std::string words;
 };
 
-/// What became of asking the controller what it played in a random dwell that is over.
-struct ToldPsd {
+/// What the controller answered when asked what it played in a random dwell that is over.
+struct ReportedPsd {
     std::vector<std::array<double, 2>> pairs;  ///< Hz and g^2/Hz at the table, as they came
     std::string why_not;                       ///< why there are none
-    double measured_g_rms = 0;  ///< by the controller over the dwell; 0: it did not say
+    double measured_g_rms = 0;  ///< by the controller over the dwell; 0: it reported none
     double power_ratio = 1;     ///< at the platform, of what is configured: Excitation
 };
 /// And what the dwell is with it; a summary without samples: as it was.
@@ -43,7 +43,7 @@ struct Played {
 };
 
 /// A stop that is made to happen, by order or by not feeding the watchdog: the amplitude may fall
-/// as it likes, and the controller may say fault; unlinked: and nobody talks to it.
+/// as it likes, and the controller may report a fault; unlinked: and nobody talks to it.
 enum class Proving : std::uint8_t { nothing, stop, watchdog, unlinked };
 
 /// What the campaign moves, what it measures of it, and who watches meanwhile. Like the other two
@@ -73,7 +73,7 @@ class Rig {
     virtual void guard(rt::Guard level) = 0;
     /// What the table is to do (0: nothing, or on its way) and where the gimbals are to be, deg.
     virtual void commanded(double /*table_g*/, const std::array<double, 3>& /*position_deg*/) {}
-    /// The table is told this, as it is told.
+    /// This is commanded, at the moment it is.
     virtual void ramping(const rt::Ramp&) {}
     /// Platform over table as a loop check in band has measured it.
     virtual void transmission(double) {}
@@ -108,7 +108,7 @@ class Dwells {
                        const std::vector<std::array<double, 2>>& /*readings*/) {}
     /// After the random dwell that was done last, where Settings::read_psd asks for it: once for
     /// each, and before the next one is ordered.
-    [[nodiscard]] virtual Played played(const ToldPsd&) { return {}; }
+    [[nodiscard]] virtual Played played(const ReportedPsd&) { return {}; }
     /// No dwell is with the estimator.
     [[nodiscard]] virtual bool free() const { return true; }
     /// A position was levelled, and this is what was torqued out.
@@ -145,7 +145,7 @@ class Log {
     virtual void proved(const ProofRecord&) {}
     [[nodiscard]] virtual std::int64_t utc_ns() const { return 0; }
     /// CLOCK_MONOTONIC, whatever clock the rig has: an arming expires in people's time.
-    [[nodiscard]] virtual drivers::Time wall() const { return rt::wall_clock(); }
+    [[nodiscard]] virtual drivers::Time steady_now() const { return rt::steady_now(); }
 };
 
 struct Ports {

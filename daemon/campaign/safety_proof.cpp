@@ -270,7 +270,7 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
     status.advice = advice(utc_ns);
     if (history_.empty()) return;
     const ProofRecord& newest = history_.back();
-    if (status.utc_ns == newest.utc_ns && !status.history.empty()) return;  // told already
+    if (status.utc_ns == newest.utc_ns && !status.history.empty()) return;  // reported already
     status.by = newest.by;
     status.utc_ns = newest.utc_ns;
     status.passed = newest.passed;

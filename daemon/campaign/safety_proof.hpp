@@ -54,7 +54,7 @@ struct ProofRecord {
     std::vector<std::pair<double, double>> transmissions;
     std::vector<FoundInStep> in_step;  ///< of those in band; earlier records have none
     std::string keys, keys_sha256;     ///< as in ProofSettings
-    std::string device;                ///< who the shaker's controller says it is; empty: not asked
+    std::string device;  ///< the identity that the shaker's controller reports; empty: not asked
 
     /// What is not known is left out.
     void found(double hz, const estimator::InStep& one) {
@@ -94,8 +94,8 @@ class SafetyProof {
 
     /// Oldest first, of earlier lives.
     void take_over(std::vector<ProofRecord> history);
-    /// Who the shaker's controller says it is: a proof of another one counts for nothing. Until it
-    /// is known each counts.
+    /// The identity that the shaker's controller reports: a proof of another one counts for
+    /// nothing. Until it is known each counts.
     void device_is(std::string device) { device_ = std::move(device); }
     void begin(const std::string& by, double table_g);
     void row(std::string name, std::string unit, double value, double low, double high);
@@ -113,7 +113,7 @@ class SafetyProof {
 
     /// Why no campaign is armed; empty: as far as this goes it may be.
     [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
-    /// What is to be told although nothing is refused: a button that nobody pressed for long.
+    /// A warning although nothing is refused: a button that nobody pressed for long.
     [[nodiscard]] std::string advice(std::int64_t utc_ns) const;
     /// Which stop of the newest proof takes clearly longer than those before it took: a contactor
     /// that wears. Empty: none, or too few to tell.
@@ -123,14 +123,14 @@ class SafetyProof {
     [[nodiscard]] std::string recording_json() const;
     void fill(ProofStatus& status, std::int64_t utc_ns) const;
     [[nodiscard]] const std::vector<ProofRecord>& history() const { return history_; }
-    /// Of the keys as they are, oldest first.
+    /// Proofs with the keys as they are, oldest first.
     [[nodiscard]] std::vector<ProofRecord> with_these_keys() const;
     /// With these keys the controller has run at 0 g, and its watchdog has stopped it there.
     [[nodiscard]] bool ran_at_zero() const;
     /// Why a shaker whose numbers nobody understands yet does not shake: what comes before it, at
     /// 0 g, was not proved with these keys. Empty: it was.
     [[nodiscard]] std::string lacks_at_zero() const;
-    /// Of the emergency stop's buttons: none of those proofs that passed had them pressed.
+    /// Buttons of the emergency stop that no proof that passed had pressed.
     [[nodiscard]] std::vector<std::string> buttons_left() const;
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
     /// otherwise: then the configuration's holds.
@@ -139,7 +139,7 @@ class SafetyProof {
     [[nodiscard]] std::vector<std::pair<double, double>> transmissions() const;
     /// Likewise what went in step with the vibration at each frequency; empty: not measured.
     [[nodiscard]] std::vector<FoundInStep> in_step() const;
-    /// Of the newest that passed; a documented allowance without one.
+    /// As the newest proof that passed has it; without one a documented allowance.
     [[nodiscard]] PadRingDown pads() const;
 
   private:

@@ -125,7 +125,7 @@ enum class OnNotValid : std::uint8_t {
     repeat  ///< the dwell that the verdict names, once
 };
 
-/// Of the opening check.
+/// A stop of the opening check.
 struct OpeningStop {
     std::array<double, 3> position_deg{};  ///< as the encoders count
     bool drifts = false;                   ///< let go there; else gravity alone is looked at
@@ -177,7 +177,7 @@ struct Settings {
     rt::RestSettings rest;
     StopSettings stop;
     ProofSettings proof;
-    double watchdog_timeout_s = 1.5;  ///< that the controller is told
+    double watchdog_timeout_s = 1.5;  ///< written to the controller
     double arming_valid_s = 600.0;    ///< an arming ends after so long without a start
     bool second_person = false;       ///< after an emergency stop two persons acknowledge it
     std::string unit;                 ///< type and serial, for whoever arms

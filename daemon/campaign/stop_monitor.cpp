@@ -48,12 +48,12 @@ bool StopMonitor::uncommanded(Time now, bool handled) {
     const bool moving = table_tells ? moves(measured.table) : !handled && moves(measured.platform);
     if (!moving) {
         moves_since_ = 0;
-        told_uncommanded_ = false;
+        uncommanded_reported_ = false;
         return false;
     }
     if (moves_since_ == 0) moves_since_ = now;
     return now - moves_since_ >= drivers::from_seconds(safety::kUnarmedMotion_s) &&
-           !std::exchange(told_uncommanded_, true);
+           !std::exchange(uncommanded_reported_, true);
 }
 
 StopMonitor::News StopMonitor::update(Time now, bool handled) {
@@ -64,7 +64,7 @@ StopMonitor::News StopMonitor::update(Time now, bool handled) {
         return News::none;
     }
     moves_since_ = 0;
-    told_uncommanded_ = false;
+    uncommanded_reported_ = false;
     if (since_ == 0) since_ = now;
     took_s_ = drivers::to_seconds(now - since_);
     const auto reading = shaker_.reading();

@@ -17,7 +17,7 @@ struct PadRingDown {
     double level_g = 0;     ///< at the table, of the stop that was measured
     double time_s = 0;      ///< it took there
     double rate_per_s = 0;  ///< of the decay; 0: not measured, an allowance instead
-    /// Of a stop from `table_g`: logarithmic in the level.
+    /// Duration of a stop from `table_g`: logarithmic in the level.
     [[nodiscard]] double from_s(double table_g) const;
 };
 
@@ -31,7 +31,7 @@ struct StopSettings {
 /// then it is stopping, and the watchdog starves. What is not at rest in its time is disobedience,
 /// which latches. Orders are counted by the shaker itself, so that one from any thread counts at
 /// once. Where nothing was asked for, what the accelerometers see for a second is motion that
-/// nobody commanded, whatever the controller says.
+/// nobody commanded, whatever the controller reports.
 class StopMonitor {
   public:
     using Rest = std::function<rt::Rest(drivers::Time)>;  ///< none: nobody knows, nothing is rest
@@ -52,8 +52,9 @@ class StopMonitor {
     [[nodiscard]] rt::Rest rest(drivers::Time now) const { return rest_ ? rest_(now) : rt::Rest{}; }
 
     enum class News : std::uint8_t { none, confirmed, disobeyed, uncommanded };
-    /// Each is told once. `handled`: gimbals or people move the platform, whose accelerometers then
-    /// say nothing of the table below it. Where a table accelerometer tells, they never do.
+    /// Each is reported once. `handled`: gimbals or people move the platform, whose accelerometers
+    /// then show nothing of the table below it. Where a table accelerometer shows it, they never
+    /// do.
     [[nodiscard]] News update(drivers::Time now, bool handled = false);
     [[nodiscard]] bool disobeyed() const noexcept { return disobeyed_; }
     /// Once it is at rest.
@@ -83,7 +84,7 @@ class StopMonitor {
     double took_s_ = 0;
     bool disobeyed_ = false;
     drivers::Time moves_since_ = 0;  ///< though nothing was asked for; 0: it does not
-    bool told_uncommanded_ = false;
+    bool uncommanded_reported_ = false;
 };
 
 }  // namespace vibrig::campaign

@@ -43,7 +43,7 @@ std::string SweepWatch::frequency(Time at, double hz) {
                     of_.from_hz, of_.to_hz, of_.seconds);
     const double time_s = drivers::to_seconds(at - from_);
     if (!(std::isfinite(hz) && hz > 0))
-        return fmt::format("the controller says {:g} Hz, {}", hz, asked);
+        return fmt::format("the controller reports {:g} Hz, {}", hz, asked);
     // Hz past its beginning and its end, in the direction of the sweep.
     const double direction = of_.to_hz > of_.from_hz ? 1 : -1;
     const double gone_hz = direction * (hz - of_.from_hz), over_hz = direction * (hz - of_.to_hz);
@@ -80,7 +80,7 @@ void SweepWatch::add(const rt::Motion& motion) {
                .force_good = motion.good});
 }
 
-/// What the accelerometers show of the frequencies that the controller says.
+/// What the accelerometers show of the frequencies that the controller reports.
 std::string SweepWatch::contradicted() {
     using estimator::spectrum::SweepBlocks;
     const auto& shares = read_.shares();

@@ -11,8 +11,8 @@
 
 namespace vibrig::campaign {
 
-/// Whether a sweep goes as it was asked for: by what the controller says of its frequency, and by
-/// what the accelerometers make of that. How far it may be off follows from the sweep, the
+/// Whether a sweep goes as it was asked for: by what the controller reports of its frequency, and
+/// by what the accelerometers make of that. How far it may be off follows from the sweep, the
 /// registers and their polling, and what the controller states: estimator::spectrum::SweepBounds.
 /// Makes its blocks on the way. Control thread only.
 class SweepWatch {
@@ -21,11 +21,12 @@ class SweepWatch {
     SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, drivers::Time at_level,
                const estimator::spectrum::SweptBy& by);
 
-    /// What the controller says of its frequency. Why that is not what was asked for, else empty.
+    /// What the controller reports of its frequency. Why that is not what was asked for, else
+    /// empty.
     [[nodiscard]] std::string frequency(drivers::Time at, double hz);
     void add(const rt::Motion& sample);
 
-    /// The newest reading says another frequency than the first one, by more than its register's
+    /// The newest reading gives another frequency than the first one, by more than its register's
     /// step: from here on what the accelerometers show is judged along the sweep, not at its
     /// beginning.
     [[nodiscard]] bool moved() const;

@@ -31,7 +31,7 @@ class ZeroCalibration {
     /// Which key of [zeroing] cannot work with these figures, what was found and expected; empty:
     /// none. Runs a simulated unit.
     [[nodiscard]] std::string refusal() const;
-    /// What the filter is told of the unit, the slews and the noise.
+    /// The filter's settings: the unit, the slews and the noise.
     [[nodiscard]] estimator::zeros::CalibrationSettings plan(
         const estimator::zeros::Way& way = {}) const;
     void reset() { first_.reset(), present_ = {}; }  ///< a new campaign

@@ -62,7 +62,8 @@ struct Configuration {
         double valid_days = 365;                 ///< so long a part of it counts
         double linear_sigma = 2;                 ///< of the gyros' linear drift terms, deg/h/g
         bool opening_check = true;  ///< before the first ramp, where the record is demanded
-        /// Of the maker's certificate, by parameter_names(): deg/h, deg/h/g, deg/h/g^2.
+        /// A coefficient of the maker's certificate, by parameter_names(): deg/h, deg/h/g,
+        /// deg/h/g^2.
         struct Coefficient {
             std::string name;
             double value = 0;
@@ -84,7 +85,7 @@ struct Configuration {
         /// transmission: Hz and platform over table; empty: "pads"
         std::vector<std::pair<double, double>> transmission;
         double pads_damping = 0.2;
-        /// Of the mean square that a controller plays about its profile, 1 sigma.
+        /// Scatter of the mean square that a controller plays about its profile, 1 sigma.
         double controller_gain = 0.01;
         /// controller_psd: "nominal", "registers", "profile", or a file that becomes the profiles'
         /// when loaded.
@@ -100,11 +101,11 @@ struct Configuration {
         std::string file;  ///< instead of psd; relative to the configuration's folder
         int number = 0;    ///< in the controller; 0: not stated
         bool at_table = false;
-        /// At the table, as the controller says that it played it; empty: as `profile` has it.
+        /// At the table, as the controller reports it; empty: as `profile` has it.
         std::vector<std::pair<double, double>> controller_psd{};
     };
     std::vector<NamedProfile> profiles;
-    /// Of the profiles that the plan plays: numbers, and abort bands; places as RandomStop::place
+    /// Profiles that the plan plays: numbers, and abort bands; places as RandomStop::place
     /// less 1.
     std::vector<std::uint16_t> played_numbers;
     std::vector<rt::RandomWitness::Settings> abort_bands;

@@ -14,7 +14,7 @@ namespace vibrig::configuration {
                                const std::string& folder = "/sys/class/net");
 
 /// What single bounds cannot tell. A rule whose keys have a problem of their own already is left
-/// out, so that one mistake is told once.
+/// out, so that one mistake is reported once.
 class CrossCheck {
   public:
     CrossCheck(const Configuration& configuration, const std::map<std::string, Place>& places,

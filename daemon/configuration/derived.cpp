@@ -127,7 +127,7 @@ void take_profiles(Configuration& c, const std::filesystem::path& folder, Place 
     }
 }
 
-/// What the controller says that it played becomes the profiles' own: a recording is read without
+/// What the controller reports as played becomes the profiles' own: a recording is read without
 /// the file.
 void take_controller_psd(Configuration& c, const std::filesystem::path& folder,
                          const Places& places, Problems& problems) {

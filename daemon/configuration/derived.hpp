@@ -10,7 +10,7 @@
 
 namespace vibrig::configuration {
 
-/// Of the keys that a file states.
+/// Places of the keys that a file states.
 using Places = std::map<std::string, Place>;
 
 /// A path in a file is relative to the file's folder.

@@ -25,7 +25,7 @@ constexpr const char* kSignSchema = R"({"enum":[1,-1]})";
 using Ends = std::array<double, 2>;
 using Matrix = std::array<std::array<double, 3>, 3>;
 
-/// What a person is told of a key.
+/// What a person reads of a key.
 struct Said {
     std::string name, type, unit, bounds, doc;
     std::string json{};

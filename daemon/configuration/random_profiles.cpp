@@ -92,10 +92,10 @@ std::optional<PlayedProfile> played(const Configuration& rig, const Named& of) {
     return out;
 }
 
-std::optional<ToldAtPlatform> at_platform(const Configuration& rig,
-                                          const spectrum::Profile& at_table) {
+std::optional<PsdAtPlatform> at_platform(const Configuration& rig,
+                                         const spectrum::Profile& at_table) {
     constexpr int kPerDecade = 100;  // 1/24 octave is 80
-    ToldAtPlatform out;
+    PsdAtPlatform out;
     out.bands = spectrum::bands_of(at_table, kPerDecade);
     const double through = weigh(rig, out.bands, true);
     if (!(through > 0)) return std::nullopt;
@@ -109,8 +109,8 @@ std::optional<ToldAtPlatform> at_platform(const Configuration& rig,
     return out;
 }
 
-std::vector<spectrum::Band> bands_told(const Configuration& rig, int number, double level_db,
-                                       std::span<const std::array<double, 2>> pairs) {
+std::vector<spectrum::Band> reported_bands(const Configuration& rig, int number, double level_db,
+                                           std::span<const std::array<double, 2>> pairs) {
     const auto nominal = stated_at(rig, number, level_db);
     if (!nominal) return {};
     const auto taken = spectrum::lines_of(pairs, nominal->name);

@@ -26,16 +26,16 @@ struct PlayedProfile {
                                                   const Configuration::NamedProfile& profile);
 
 /// What a controller's PSD at the table, of its dwell, is at the platform.
-struct ToldAtPlatform {
+struct PsdAtPlatform {
     estimator::RandomVibration random;  ///< profile and level are left to the dwell
     estimator::Seen seen;
     std::vector<estimator::spectrum::Band> bands;
 };
 /// None where the transmission is not known, or the accelerometers see less than half of it.
-[[nodiscard]] std::optional<ToldAtPlatform> at_platform(
+[[nodiscard]] std::optional<PsdAtPlatform> at_platform(
     const Configuration& rig, const estimator::spectrum::Profile& at_table);
 /// The same of pairs as a recording has them, which were taken: their bands alone, or none.
-[[nodiscard]] std::vector<estimator::spectrum::Band> bands_told(
+[[nodiscard]] std::vector<estimator::spectrum::Band> reported_bands(
     const Configuration& rig, int number, double level_db,
     std::span<const std::array<double, 2>> pairs);
 /// The profile with this number in the controller, at this level; none: there is no such.

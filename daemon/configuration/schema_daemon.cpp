@@ -75,7 +75,8 @@ std::vector<Key> mqtt_keys() {
     const auto mqtt = part(&C::mqtt);
     return {
         text("mqtt.host", mqtt(&M::host), "a host name or numeric address, or \"\"",
-             "MQTT broker that is told the status (Sparkplug B); empty: none", host_or_empty_rule),
+             "MQTT broker that the status is published to (Sparkplug B); empty: none",
+             host_or_empty_rule),
         integer("mqtt.port", mqtt(&M::port), "", 1, 65'535, "the broker's; 8883 is usual with TLS"),
         boolean("mqtt.tls", mqtt(&M::tls), "false: in clear, to a broker on this machine only"),
         text("mqtt.ca", mqtt(&M::ca), "a path",
@@ -93,7 +94,7 @@ std::vector<Key> mqtt_keys() {
         text("mqtt.node", mqtt(&M::node), "letters, digits, ' ', '.', '_', '-'",
              "edge node id, another one for each rig", campaign_name_rule),
         number("mqtt.period_s", mqtt(&M::period_s), "s", {0.1, 3600},
-               "what has changed is told so often"),
+               "what has changed is published so often"),
         number("mqtt.backoff_max_s", mqtt(&M::backoff_max_s), "s", {0.5, 3600},
                "longest wait before a lost broker is sought again"),
     };

@@ -33,7 +33,7 @@ std::vector<Key> guard_keys() {
         integer("annunciator.modbus.lamp_coil", horn(&H::lamp_coil), "", -1, 65'535,
                 "coil of the lamp; -1: there is none"),
         text("annunciator.command", annunciator(&A::command), "an absolute path, or \"\"",
-             "program that pages somebody, told as JSON on its standard input; empty: none",
+             "program that pages somebody, with JSON on its standard input; empty: none",
              program_rule),
         seconds("annunciator.command_limit_s", annunciator(&A::command_limit), {1, 600},
                 "it is killed after so long, with its children"),

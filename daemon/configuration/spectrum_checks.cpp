@@ -244,7 +244,7 @@ void CrossCheck::sweeps_of_plan() {
         if (!(stop.table_g > 0)) return blame("campaign.plan", " at 0 g", "a level");
         if (stop.verify)
             return blame("campaign.plan", " with role \"verify\"",
-                         "\"identify\": a sweep is no row to be foretold");
+                         "\"identify\": a sweep is no row to be predicted");
         if (c_.estimator.method != estimator::Method::joint)
             return blame("estimator.method", "",
                          "estimator.method = \"joint\": the two-step route has coefficients at one "
@@ -285,10 +285,10 @@ void CrossCheck::frequencies_of_plan() {
                 "vibration.frequency_hz", "spectrum.transmission"}))
         return;
     const double window_s = c_.estimator.level_window_s, rate = rate_of(c_);
-    bool told = false, reference = false;
+    bool surveyed = false, reference = false;
     for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
         const auto& stop = c_.campaign.stops[i];
-        told = told || stop.random || stop.sweep.any();
+        surveyed = surveyed || stop.random || stop.sweep.any();
         if (!stop.random && !stop.sweep.any() && stop.frequency_hz <= 0 && stop.table_g > 0)
             reference = true;
         if (stop.frequency_hz <= 0 || stop.table_g <= 0) continue;
@@ -316,9 +316,9 @@ void CrossCheck::frequencies_of_plan() {
             return blame("estimator.method",
                          "estimator.method = \"joint\": the two-step route has "
                          "coefficients at one frequency only");
-        told = true;
+        surveyed = true;
     }
-    if (told && !reference)
+    if (surveyed && !reference)
         refuse({"campaign.plan", "vibration.frequency_hz"},
                "no dwell to identify at " + plain(c_.estimator.frequency_hz) + " Hz within 2 %",
                "the plan's lowest frequency as vibration.frequency_hz: its dwells give the 30 "

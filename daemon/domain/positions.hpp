@@ -7,12 +7,12 @@
 
 namespace vibrig {
 
-/// Of a sweep, beside frequencies, which are small numbers: what tells one from another.
+/// Number that distinguishes a sweep from others, beside frequencies, which are small numbers.
 [[nodiscard]] constexpr double kind_of_sweep(double from_hz, double to_hz) noexcept {
     return 1e9 + 1e5 * from_hz + to_hz;
 }
 
-/// Of a position that is done, what an adaptive campaign needs to go on after a restart.
+/// What an adaptive campaign needs of a position that is done to go on after a restart.
 struct StopDone {
     std::array<double, 3> position_deg{};
     double table_g = 0;
@@ -24,11 +24,11 @@ struct StopDone {
     double frequency_hz = 0;  ///< 0: the configuration's
     bool held_out = false;
     std::uint16_t profile = 0;  ///< of random vibration, its number in the controller; 0: none
-    /// Of a sweep: its ends, 0: none; and what the controller said of its frequency meanwhile, s
-    /// since the dwell began and Hz.
+    /// A sweep's ends, 0: none; and what the controller reported of its frequency meanwhile,
+    /// s since the dwell began and Hz.
     double sweep_from_hz = 0, sweep_to_hz = 0;
     std::vector<std::array<double, 2>> swept_hz{};
-    /// Of random vibration: what the controller says that it played, Hz and g^2/Hz at the table.
+    /// Random vibration as the controller reports it as played, Hz and g^2/Hz at the table.
     std::vector<std::array<double, 2>> psd{};
     /// As campaign::Stop::kind().
     [[nodiscard]] double kind() const {

@@ -52,7 +52,7 @@ struct MqttStatus {
     bool connected = false;
     std::string note;  ///< why it is not
     std::uint64_t connections = 0, births = 0, messages = 0;
-    std::uint64_t left_out = 0;  ///< times the broker was too slow to be told
+    std::uint64_t left_out = 0;  ///< times the broker was too slow to take an update
 };
 
 /// Campaigns on their way to the archive; nothing is lost of what waits.

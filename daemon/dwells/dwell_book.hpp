@@ -60,7 +60,8 @@ class DwellBook {
         const estimator::DwellInfo& info;
         drivers::Time length = 0;  ///< as it was ordered
         std::span<const estimator::Measurement> measurements;
-        /// Of a sweep: what the controller said of its frequency, s since the dwell began and Hz.
+        /// What the controller reported of a sweep's frequency, s since the dwell began and
+        /// Hz.
         std::span<const std::array<double, 2>> swept_hz;
     };
     /// All of it at once, through the same steps as one from a stage, what was played in it and
@@ -71,9 +72,9 @@ class DwellBook {
     /// what was measured, since bands need the rig's configuration; take_again() its sweeps.
     struct Spectrum {
         std::vector<estimator::spectrum::Sweep> sweeps;
-        /// Bands at the platform of its random dwells whose PSD was told, by DwellRow::psd.
+        /// Bands at the platform of its random dwells whose PSD was reported, by DwellRow::psd.
         std::vector<std::vector<estimator::spectrum::Band>> psds;
-        std::vector<std::array<double, 2>> psd_before;  ///< the newest as it was told
+        std::vector<std::array<double, 2>> psd_before;  ///< the newest as it was reported
     };
     [[nodiscard]] Spectrum& spectrum() noexcept { return spectrum_; }
     [[nodiscard]] const Spectrum& spectrum() const noexcept { return spectrum_; }

@@ -228,14 +228,14 @@ AmplitudeWitness::Verdict AmplitudeWitness::verdict(const Situation& now) noexce
             if (!lasting(wrong, since, newest_) || finding.wrong) return;
             finding = {true, is_table ? Channel::table_accel : Channel::accel_x, seen};
         };
-        const bool told = seen >= 0 || std::isnan(seen);
+        const bool shown = seen >= 0 || std::isnan(seen);
         const double armed = now.ramp.armed_g;
-        judge(verdict.off_command, told && !suspect[w] && !(seen >= least && seen <= most),
+        judge(verdict.off_command, shown && !suspect[w] && !(seen >= least && seen <= most),
               off_since_[w]);
         judge(verdict.over_armed,
-              told && armed > 0 && !(seen <= std::max(armed * doubt, armed + kToleranceG)),
+              shown && armed > 0 && !(seen <= std::max(armed * doubt, armed + kToleranceG)),
               over_since_[w]);
-        judge(verdict.over_limit, told && !(seen <= now.limit_g * (known ? 1 : doubt)),
+        judge(verdict.over_limit, shown && !(seen <= now.limit_g * (known ? 1 : doubt)),
               limit_since_[w]);
     }
     return verdict;

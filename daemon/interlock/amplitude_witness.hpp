@@ -25,7 +25,7 @@ struct Sweep {
     [[nodiscard]] double transmission_at(drivers::Time at) const noexcept;
 };
 
-/// What the table was told; amplitudes are peak at the table.
+/// What was commanded; amplitudes are peak at the table.
 struct Ramp {
     double start_g = 0, target_g = 0;
     drivers::Time begin = 0;  ///< when it was asked for; the controller begins at its last write
@@ -100,7 +100,7 @@ class AmplitudeWitness {
     /// True: a block is complete, and verdict() judges the newest.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
-    /// Whether an accelerometer does not move that should; all that is told of random vibration,
+    /// Whether an accelerometer does not move that should; all that is judged of random vibration,
     /// whose peaks are beyond its rms.
     [[nodiscard]] Verdict::Finding stuck(const Situation& situation) const noexcept;
     [[nodiscard]] double window_s() const noexcept { return drivers::to_seconds(window_); }
@@ -113,7 +113,8 @@ class AmplitudeWitness {
     void set_windows() noexcept;
     [[nodiscard]] double platform_g() const noexcept;
     [[nodiscard]] double table_g() const noexcept;
-    /// Of platform and table: one does not move where another does, and will be named as stuck.
+    /// Platform, table: true for one that does not move where another does; it will be named as
+    /// stuck.
     [[nodiscard]] std::array<bool, 2> look_for_stuck(const Situation& now, double command_g,
                                                      Verdict& verdict) const noexcept;
     /// Largest less smallest reading in the newest blocks, g; infinite: too few.

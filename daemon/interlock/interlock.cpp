@@ -15,7 +15,7 @@ namespace vibrig::rt {
 using drivers::Channel;
 using drivers::Time;
 
-Time wall_clock() noexcept {
+Time steady_now() noexcept {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
                std::chrono::steady_clock::now().time_since_epoch())
         .count();
@@ -176,51 +176,53 @@ bool Interlock::table_beyond_limit(const drivers::Sample& sample) const noexcept
     constexpr double kHardlyEver = 6.1;  // sigmas, once in 1e9
     if (sample.of(Channel::table_accel) != drivers::Quality::good) return false;
     const double limit_g =
-        at_random() ? std::max(table_g_, kHardlyEver * std::max(told_.start_g, told_.target_g))
-                    : table_g_;
+        at_random()
+            ? std::max(table_g_, kHardlyEver * std::max(commanded_.start_g, commanded_.target_g))
+            : table_g_;
     return !(std::abs(sample.table_accel) <= limit_g);
 }
 
 void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
-    const std::uint64_t before = told_.number;
-    static_cast<void>(ramp_.try_read(told_));
-    if (told_.number != before) {
+    const std::uint64_t before = commanded_.number;
+    static_cast<void>(ramp_.try_read(commanded_));
+    if (commanded_.number != before) {
         controller_began_ = 0;
-        const double hz = told_.frequency_hz > 0 ? told_.frequency_hz : frequency_hz_;
-        if (told_.sweep.any())
-            witness_.follow(told_.sweep);
+        const double hz = commanded_.frequency_hz > 0 ? commanded_.frequency_hz : frequency_hz_;
+        if (commanded_.sweep.any())
+            witness_.follow(commanded_.sweep);
         else
             witness_.retune(hz);
         seconds_.retune(hz);
-        if (told_.random > random_.size()) told_.random = 0;
-        if (told_.random > 0 && told_.target_g > told_.start_g) {
-            RandomWitness& witness = random_[told_.random - 1U];
-            if (told_.start_g == 0) witness.begin();
-            motion_.begin(witness.time_for_tilt_s(told_.target_g * transmission_told()));
+        if (commanded_.random > random_.size()) commanded_.random = 0;
+        if (commanded_.random > 0 && commanded_.target_g > commanded_.start_g) {
+            RandomWitness& witness = random_[commanded_.random - 1U];
+            if (commanded_.start_g == 0) witness.begin();
+            motion_.begin(witness.time_for_tilt_s(commanded_.target_g * commanded_transmission()));
             verdict_ = {};
         }
     }
     const Time now = std::max(sample.time, now_);
     if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
-        controller_began_ = std::max(now, told_.begin);
+        controller_began_ = std::max(now, commanded_.begin);
 }
 
 bool Interlock::stands_in_samples(Time at) const noexcept {
     constexpr double kFast_hz = 2;  // with a mean over two seconds
-    return std::abs(std::remainder(told_.sweep.hz(at), rate_hz_)) < kFast_hz;
+    return std::abs(std::remainder(commanded_.sweep.hz(at), rate_hz_)) < kFast_hz;
 }
 
 void Interlock::check_random(const drivers::Sample& sample) noexcept {
     const bool steady = commanded_g_.load() > 0;
-    const auto found = random_[told_.random - 1U].add(sample, {told_, steady, transmission_told()});
+    const auto found =
+        random_[commanded_.random - 1U].add(sample, {commanded_, steady, commanded_transmission()});
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(found.seen_g[i]);
     const bool complete = witness_.add(sample);
     if (proving_.load()) return;
     judge(Trip::amplitude_witness, found.off_command, sample.time);
     if (complete)
         judge(Trip::stuck,
-              witness_.stuck(
-                  {told_, controller_began_, sample.time, steady, transmission_told(), table_g_}),
+              witness_.stuck({commanded_, controller_began_, sample.time, steady,
+                              commanded_transmission(), table_g_}),
               sample.time);
 }
 
@@ -228,8 +230,8 @@ void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
     follow_ramp(sample);
     if (at_random()) return check_random(sample);
     if (!witness_.add(sample)) return;
-    verdict_ = witness_.verdict({told_, controller_began_, std::max(sample.time, now_),
-                                 commanded_g_.load() > 0, transmission_told(), table_g_});
+    verdict_ = witness_.verdict({commanded_, controller_began_, std::max(sample.time, now_),
+                                 commanded_g_.load() > 0, commanded_transmission(), table_g_});
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
     judge(Trip::over_armed, verdict_.over_armed, sample.time);
     if (proving_.load()) return;
@@ -306,7 +308,7 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
 }
 
 void Interlock::lost_bus() noexcept {
-    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, wall_clock());
+    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, steady_now());
 }
 
 void Interlock::check(const drivers::ShakerReading& reading) noexcept {
@@ -359,7 +361,7 @@ void Interlock::uncommanded() noexcept {
 
 void Interlock::stop_written() noexcept {
     if (const Time asked = stop_asked_.exchange(0); asked != 0)
-        reactions_.add(wall_clock() - asked);
+        reactions_.add(steady_now() - asked);
 }
 
 std::string Interlock::text_of(const Tripped& tripped) const {

@@ -26,7 +26,8 @@ namespace vibrig::rt {
 struct alignas(8) Tripped {
     Trip cause = Trip::none;
     std::uint8_t row = 0;
-    std::uint8_t channel = drivers::kChannels;  ///< drivers::Channel that told; kChannels: none
+    std::uint8_t channel =
+        drivers::kChannels;   ///< drivers::Channel that showed it; kChannels: none
     std::uint8_t number = 0;  ///< of this trip, so that the same one again is another
     float value = 0;          ///< as judged to be wrong
     [[nodiscard]] explicit operator bool() const noexcept { return cause != Trip::none; }
@@ -37,7 +38,7 @@ struct alignas(8) Tripped {
 static_assert(sizeof(Tripped) == 8 && std::atomic<Tripped>::is_always_lock_free);
 static_assert(kMostRules <= 256, "a row's number fits into a byte");
 /// CLOCK_MONOTONIC, whatever clock the rig has.
-[[nodiscard]] drivers::Time wall_clock() noexcept;
+[[nodiscard]] drivers::Time steady_now() noexcept;
 
 /// Software's share of a reaction: frames in to stop confirmed by the controller, wall time.
 class ReactionHistogram {
@@ -68,7 +69,8 @@ class Interlock {
         std::vector<Rule> rules = default_interlock();             ///< kMostRules at most
         AmplitudeWitness::Settings witness = {};
         double transmission = 1;  ///< platform over table, until it is measured
-        /// Of each random vibration that there may be: Ramp::random is a place in it, from 1.
+        /// Settings of each random vibration that there may be: Ramp::random is a place in it,
+        /// from 1.
         std::vector<RandomWitness::Settings> random = {};
     };
     /// One row as it stands now.
@@ -85,14 +87,14 @@ class Interlock {
     /// Control thread: what the table is to do (0: nothing yet, or ramping) and where the gimbals
     /// are to be, deg as the encoders count.
     void command(double table_g, const std::array<double, 3>& position_deg) noexcept;
-    /// Control thread: what the table is told, as it is told.
+    /// Control thread: what is commanded, at the moment it is.
     void ramp(Ramp ramp) noexcept {
         ramp.number = ++ramps_;
         ramp_.publish(ramp);
     }
     /// Control thread: a stop is proved by making it happen. The amplitude may fall as it likes
-    /// then, and the controller may say fault once nobody feeds its watchdog; nothing may rise.
-    /// `unlinked`: nobody reads it meanwhile.
+    /// then, and the controller may report a fault once nobody feeds its watchdog; nothing may
+    /// rise. `unlinked`: nobody reads it meanwhile.
     void proving(bool stop, bool unlinked = false) noexcept {
         proving_.store(stop);
         unlinked_.store(unlinked);
@@ -132,19 +134,19 @@ class Interlock {
     void lost_bus() noexcept;
     /// Control thread, which alone judges this one: its row is raised whatever tripped before.
     void stop_disobeyed(bool disobeyed) noexcept {
-        judge(By::read_back, Trip::stop_disobeyed, disobeyed, wall_clock());
+        judge(By::read_back, Trip::stop_disobeyed, disobeyed, steady_now());
     }
     /// Control thread: the accelerometers see motion where nothing was asked for.
     void uncommanded() noexcept;
     /// Control thread, which alone judges this one: they see another vibration than was asked for.
     void wrong_vibration(bool wrong) noexcept {
-        judge(By::read_back, Trip::wrong_vibration, wrong, wall_clock());
+        judge(By::read_back, Trip::wrong_vibration, wrong, steady_now());
     }
     /// Control thread, which alone judges these two: over what the loop check found, allowances
     /// in; both judged not wrong: none is looked for any more.
     void growth(double motion_in_step, double across) noexcept {
-        judge(By::read_back, Trip::motion_in_step, motion_in_step, wall_clock());
-        judge(By::read_back, Trip::cross_growth, across, wall_clock());
+        judge(By::read_back, Trip::motion_in_step, motion_in_step, steady_now());
+        judge(By::read_back, Trip::cross_growth, across, steady_now());
     }
     void no_growth() noexcept;
     /// Any thread. The first cause stays.
@@ -156,7 +158,7 @@ class Interlock {
     [[nodiscard]] Trip tripped() const noexcept { return latched().cause; }
     /// Control thread: cause in words, with the value and its limit.
     [[nodiscard]] std::string text_of(const Tripped& tripped) const;
-    /// Of the row that tripped; empty: none.
+    /// Name of the row that tripped; empty: none.
     [[nodiscard]] std::string name_of(const Tripped& tripped) const;
     /// Clears the trip if it is `handled`; one that came meanwhile stays.
     void acknowledge(const Tripped& handled) noexcept;
@@ -165,7 +167,7 @@ class Interlock {
 
     [[nodiscard]] std::size_t rows() const noexcept { return rules_.size(); }
     [[nodiscard]] RowState row(std::size_t i) const noexcept;
-    /// Of the rows of a condition; infinite without one.
+    /// The least limit in the rows of a condition; infinite without one.
     [[nodiscard]] double least_limit(Trip condition) const noexcept;
     [[nodiscard]] ReactionHistogram::Counts reactions() const noexcept {
         return reactions_.counts();
@@ -197,20 +199,20 @@ class Interlock {
     void check_witnesses(const drivers::Sample& sample) noexcept;
     void check_random(const drivers::Sample& sample) noexcept;
     [[nodiscard]] bool table_beyond_limit(const drivers::Sample& sample) const noexcept;
-    /// What the table is told is random vibration, and it is not at rest.
+    /// What is commanded is random vibration, and not rest.
     [[nodiscard]] bool at_random() const noexcept {
-        return told_.random > 0 && std::max(told_.start_g, told_.target_g) > 0;
+        return commanded_.random > 0 && std::max(commanded_.start_g, commanded_.target_g) > 0;
     }
-    /// What the table is told is a sweep, and it is not at rest.
+    /// What is commanded is a sweep, and not rest.
     [[nodiscard]] bool sweeping() const noexcept {
-        return told_.sweep.any() && std::max(told_.start_g, told_.target_g) > 0;
+        return commanded_.sweep.any() && std::max(commanded_.start_g, commanded_.target_g) > 0;
     }
     [[nodiscard]] bool stands_in_samples(drivers::Time at) const noexcept;
-    /// Platform over table, of what the table is told.
-    [[nodiscard]] double transmission_told() const noexcept {
-        if (told_.sweep.any() && told_.sweep.transmission[0] > 0)
-            return told_.sweep.transmission_at(std::max(now_, sample_time_));
-        return told_.transmission > 0 ? told_.transmission : transmission_.load();
+    /// Platform over table, of what is commanded.
+    [[nodiscard]] double commanded_transmission() const noexcept {
+        if (commanded_.sweep.any() && commanded_.sweep.transmission[0] > 0)
+            return commanded_.sweep.transmission_at(std::max(now_, sample_time_));
+        return commanded_.transmission > 0 ? commanded_.transmission : transmission_.load();
     }
     Guard follow_guard() noexcept;
     void check_motion(const drivers::Sample& sample) noexcept;
@@ -250,7 +252,7 @@ class Interlock {
     AmplitudeWitness::Verdict verdict_;  ///< the newest
     std::vector<RandomWitness> random_;
     bool bands_needed_ = false;  ///< of the controller itself
-    Ramp told_;
+    Ramp commanded_;
     drivers::Time controller_began_ = 0;
     drivers::Time sample_time_ = 0;  ///< of the newest sample
     bool motion_stood_ = false;      ///< no motion was to be had of the sample before

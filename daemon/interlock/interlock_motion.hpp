@@ -19,7 +19,7 @@ class MotionMonitor {
     /// Excitation begins: the vertical is learnt anew.
     void begin() noexcept { *this = {}; }
     /// The same under a random vibration, whose mean takes so long to show the vertical; none:
-    /// nothing is told.
+    /// there is no verdict.
     void begin(std::optional<double> time_constant_s) noexcept {
         *this = {};
         time_constant_s_ = time_constant_s.value_or(0);
@@ -27,7 +27,7 @@ class MotionMonitor {
     /// Samples whose force is good only.
     void add(const drivers::Sample& sample) noexcept;
 
-    /// rms across over rms along the vertical; negative while it cannot be told.
+    /// rms across over rms along the vertical; negative while it is not known.
     [[nodiscard]] double cross_share() const noexcept;
     /// Angle between the vertical now and when it was first known, deg; negative: not known.
     [[nodiscard]] double tilt_deg() const noexcept;
@@ -38,7 +38,7 @@ class MotionMonitor {
     Vector mean_{}, reference_{};
     std::array<double, 6> covariance_{};  ///< xx yy zz xy xz yz
     bool known_ = false;
-    double time_constant_s_ = kTimeConstant_s;  ///< 0: nothing can be told
+    double time_constant_s_ = kTimeConstant_s;  ///< 0: never known
 };
 
 /// Share of samples that were lost or incomplete over the last ten seconds or so.

@@ -115,7 +115,7 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
      "the controller's watchdog timeout is not what was written", Guard::armed, true},
     {Trip::guard_lost, "guard_lost", "no word from vibrig-guard", Guard::armed},
     {Trip::guard_stop, "guard_stop", "vibrig-guard has stopped the shaker", Guard::idle, true},
-    {Trip::horn, "annunciator_silent", "horn or lamp do not read back as told"},
+    {Trip::horn, "annunciator_silent", "horn or lamp do not read back as commanded"},
     {Trip::wrong_vibration, "wrong_vibration",
      "the accelerometers do not show the vibration that was asked for", Guard::excitation, true},
     {Trip::abort_bands, "abort_bands",

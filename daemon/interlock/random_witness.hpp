@@ -16,7 +16,7 @@ namespace vibrig::rt {
 /// once the level has been taken for reached. Acquisition thread; add() does not allocate.
 class RandomWitness {
   public:
-    /// Of one profile; see RandomBands::Settings.
+    /// Settings of one profile; see RandomBands::Settings.
     struct Settings {
         double sample_hz = 0;  ///< to be stated
         double table_bandwidth_hz = 0, platform_bandwidth_hz = 0;

@@ -27,7 +27,7 @@ enum class RestVerdict : std::uint8_t {
     still,
 };
 
-/// What one accelerometer says.
+/// What one accelerometer shows.
 struct RestWitness {
     RestVerdict verdict = RestVerdict::unknown;
     double rms_g = 0;        ///< over the window; 0 while unknown
@@ -36,7 +36,7 @@ struct RestWitness {
     bool doubted = false;  ///< unknown because it has not been seen to move since it was doubted
 };
 
-/// What all accelerometers say at one moment.
+/// What all accelerometers show at one moment.
 struct Rest {
     RestWitness platform, table;
     [[nodiscard]] bool measured() const noexcept { return measured_since(0); }
@@ -107,8 +107,8 @@ class RestMonitor {
 
     /// Acquisition thread; neither allocates, locks nor logs.
     void add(const drivers::Sample& sample) noexcept;
-    /// Acquisition thread, or before it starts: an accelerometer has contradicted what the table
-    /// was told. Its body's stillness is no rest until it is seen to move, or to be noisy.
+    /// Acquisition thread, or before it starts: an accelerometer has contradicted what was
+    /// commanded. Its body's stillness is no rest until it is seen to move, or to be noisy.
     void doubt(drivers::Channel channel) noexcept;
     /// Any thread. What is too old by `now` is unknown.
     [[nodiscard]] Rest rest(drivers::Time now) const noexcept;

@@ -55,7 +55,7 @@ class ChainedFile {
 
     [[nodiscard]] const SignedHead& head() const noexcept { return head_; }
     [[nodiscard]] const Link& newest() const noexcept { return chain_.last(); }
-    /// Of an entry of its own, signed anew; nothing: the chain has no such row.
+    /// Head of an entry of its own, signed anew; nothing: the chain has no such row.
     [[nodiscard]] std::optional<SignedHead> head_of(std::string_view table, std::int64_t row);
     [[nodiscard]] std::string public_key() const { return key_ ? key_->public_key() : ""; }
     /// By open(): all of its rows; SQLite's own integrity.

@@ -29,7 +29,7 @@ struct DwellCheckpoint {
 
 inline constexpr std::uint32_t kCheckpointVersion = 9;
 
-/// Of everything that the results depend on, "key = value" one per line.
+/// Hash of everything that the results depend on, "key = value" one per line.
 [[nodiscard]] std::uint64_t configuration_hash(std::string_view text) noexcept;
 
 /// With version, configuration hash and checksum.

@@ -244,7 +244,8 @@ bool Journal::write(const std::deque<Entry>& entries) {
     return why.empty();
 }
 
-/// After it was told that the entries are on disk: nobody waits for the head, which may lag behind.
+/// After it was reported that the entries are on disk: nobody waits for the head, which may lag
+/// behind.
 void Journal::publish() {
     const auto why = file_.publish();
     watch_.wrote(file_.newest(), why.empty() ? file_.newest() : Link{});

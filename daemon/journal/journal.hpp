@@ -139,7 +139,7 @@ class Journal {
         std::string by, record;
         std::int64_t utc_ns = 0;
     };
-    /// Of the table `safety`: the arming, and what has to be acknowledged.
+    /// A row of the table `safety`: the arming, and what has to be acknowledged.
     struct Safety {
         const char* what = "";
         std::string name, person, text;

@@ -20,8 +20,8 @@ inline constexpr const char* kJournalLatch = "journal";
 /// What has stopped the shaker or forbids arming, until named persons acknowledge it. One thread.
 class Latches {
   public:
-    /// Of what an earlier life left, or what happens now. The same name again: its acknowledgement
-    /// begins anew.
+    /// Adds what an earlier life left, or what happens now. The same name again: its
+    /// acknowledgement begins anew.
     void add(Latch latch);
     [[nodiscard]] const std::vector<Latch>& open() const noexcept { return open_; }
     /// Those that keep the state tripped: all but the journal's.

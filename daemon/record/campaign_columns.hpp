@@ -56,7 +56,7 @@ struct DwellNumbers {
     double sync_arcsec = not_known<1>()[0];
 };
 
-/// Of the channels. Until recordings named them there were these.
+/// Names of the channels. Until recordings named them there were these.
 inline const hdf5::Names& channel_names() {
     static const hdf5::Names kNames = [] {
         hdf5::Names names{
@@ -181,7 +181,7 @@ void columns_of(Of<PsdLine> auto& line, auto&& column) {
     column("psd_g2_hz", line.psd_g2_hz, "g^2/Hz", "likewise, at the table");
 }
 
-/// Of a dwell whose covariance is there.
+/// Columns of a dwell whose covariance is there.
 void columns_of(Of<Dwell> auto& dwell, auto&& column) {
     auto& s = dwell.summary;
     column("time_ns", dwell.time, "ns", kTimeText);

@@ -30,7 +30,7 @@ struct Campaign {
     std::size_t restarted_at = 0;  ///< dwells done when the daemon was last started
     std::int64_t ended_utc_ns = 0;
     std::string result_json;
-    /// Of the result: with what noise it was identified anew; nothing: it is the live one.
+    /// With what noise the result was identified anew; nothing: it is the live one.
     std::optional<noise::Found> found;
     std::vector<drivers::Sample> samples;
     std::vector<Order> orders;
@@ -91,7 +91,7 @@ void close_part(const std::string& path, const std::string& next);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
 /// That of a rig that is a program, by its effective configuration.
 [[nodiscard]] bool of_simulated_rig(const std::string& configuration);
-/// Of the effective configuration, the sections on which the identification depends,
+/// The sections of the effective configuration on which the identification depends,
 /// and what a report states.
 [[nodiscard]] std::string identification_sections(const std::string& configuration);
 /// The raw log's files in order, compressed or not.
@@ -99,7 +99,7 @@ void close_part(const std::string& path, const std::string& next);
 /// Names of those in the folder that are not among `logs`, by their numbers.
 [[nodiscard]] std::vector<std::string> left_out(const std::string& folder,
                                                 const std::vector<std::string>& logs);
-/// Of raw-0003.log, compressed or not: 3; 0 for other names.
+/// Number of raw-0003.log, compressed or not: 3; 0 for other names.
 [[nodiscard]] int raw_number(const std::string& path);
 /// Logs in the order in which they are read: segments of one folder by their numbers, each once
 /// where both it and its compressed one are given; others as they are given. Throws

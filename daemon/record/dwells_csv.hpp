@@ -10,7 +10,7 @@
 
 namespace vibrig::record {
 
-/// Of the orders. Older files end before sweep_from_hz, profile, frequency_hz, power_lost or
+/// Header of the orders. Older files end before sweep_from_hz, profile, frequency_hz, power_lost or
 /// begin_s.
 inline constexpr const char* kDwellsHeader =
     "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
@@ -20,10 +20,10 @@ inline constexpr const char* kDwellsHeader =
 [[nodiscard]] std::string order_line(Order order, std::int64_t utc_offset_ns);
 /// The daemon was started again and went on after so many dwells.
 [[nodiscard]] std::string restart_line(std::size_t dwells);
-/// What the controller said of a sweep's frequency, as JSON [run, position, [[us, ns beyond them,
-/// Hz], ..]].
+/// What the controller reported of a sweep's frequency, as JSON [run, position, [[us, ns beyond
+/// them, Hz], ..]].
 [[nodiscard]] std::string swept_line(const Swept& swept, std::int64_t utc_offset_ns);
-/// Behind the order of a random dwell what the controller says that it played, as JSON [run,
+/// Behind the order of a random dwell what the controller reports as played, as JSON [run,
 /// position, word, mean_square_g2, bandwidth_hz, gain_error, highest_hz, share seen, its error,
 /// [[Hz, g^2/Hz], ..]].
 [[nodiscard]] std::string played_line(const Played& played);

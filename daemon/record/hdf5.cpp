@@ -22,7 +22,7 @@ namespace {
 
 static_assert(sizeof(hid_t) == sizeof(std::int64_t));
 
-/// The library prints to standard error unless told not to, each thread for itself.
+/// The library prints to standard error unless switched off, in each thread.
 void quiet() {
     // A file whose closing a sick disk refused is not closed a second time at exit: the library
     // crashes there. Whoever ends has closed the others.
@@ -67,8 +67,9 @@ Handle text_type(std::size_t size) {
     return type;
 }
 
-/// Of an attribute. All texts are UTF-8; of datasets HDF5 is told the default, ASCII, since Octave
-/// refuses a whole file with a dataset that says UTF-8, and other readers hand over the bytes.
+/// Of an attribute. All texts are UTF-8; datasets are declared with the default, ASCII, since
+/// Octave refuses a whole file with a dataset that says UTF-8, and other readers hand over the
+/// bytes.
 Handle attribute_type(std::size_t size) {
     Handle type = text_type(size);
     H5Tset_cset(type.get(), H5T_CSET_UTF8);

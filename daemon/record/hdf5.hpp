@@ -46,7 +46,8 @@ struct Array {
     std::vector<T> values;
 };
 
-/// Of the numbers in a row of a column that has one for each of something: its attribute `names`.
+/// Names of the numbers in a row of a column that has one for each of something: its attribute
+/// `names`.
 struct Names {
     std::vector<std::string> now;
     std::vector<std::string> unnamed;  ///< the first of these, where the file does not say
@@ -86,7 +87,7 @@ class File {
     [[nodiscard]] Array<std::int64_t> integers(const std::string& name) const;
     [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
     [[nodiscard]] std::vector<std::size_t> dimensions(const std::string& name) const;
-    /// Of each number in a row of such a column its place in `names.now`. An older file may have
+    /// The place in `names.now` of each number in a row of such a column. An older file may have
     /// fewer; one with others is refused.
     [[nodiscard]] std::vector<std::size_t> places(const std::string& name,
                                                   const Names& names) const;

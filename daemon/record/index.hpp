@@ -38,7 +38,7 @@ struct IndexedCampaign {
 class Index {
   public:
     using Tell = std::function<void(const std::string& words)>;
-    /// Opens or makes it; a damaged one is made anew, and told.
+    /// Opens or makes it; a damaged one is made anew, and reported.
     Index(std::string folder, const Tell& tell);
     ~Index();
 

@@ -100,7 +100,7 @@ bool RawLog::take_gap(Gap& gap) {
 void RawLog::refuse(const std::string& why) {
     good_ = false;
     note_ = why;
-    retry_wall_ns_ = wall_ns() + kRetryNs;
+    retry_steady_ns_ = steady_ns() + kRetryNs;
     forget();
 }
 
@@ -130,7 +130,7 @@ void RawLog::open() {
 void RawLog::flush() {
     if (buffer_.empty()) return;
     if (fd_ < 0) {
-        if (!good_ && wall_ns() < retry_wall_ns_) return forget();
+        if (!good_ && steady_ns() < retry_steady_ns_) return forget();
         open();
         if (fd_ < 0) return;
     }

@@ -65,7 +65,7 @@ class RawLog {
     std::string buffer_;
     std::uint64_t buffered_ = 0;  ///< frames
     drivers::Time buffer_from_ = 0, buffer_to_ = 0;
-    std::int64_t retry_wall_ns_ = 0;
+    std::int64_t retry_steady_ns_ = 0;
     bool good_ = true;
     std::string note_;
     std::uint64_t frames_ = 0, lost_ = 0, bytes_ = 0;

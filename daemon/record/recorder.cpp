@@ -133,7 +133,7 @@ RecorderStatus Recorder::status() const {
 }
 
 void Recorder::show() {
-    shown_.good = !told_bad_;
+    shown_.good = !reported_bad_;
     if (raw_) {
         shown_.frames = raw_->frames();
         shown_.frames_lost = raw_->lost();
@@ -146,8 +146,8 @@ void Recorder::show() {
 }
 
 double Recorder::stuck_s() const noexcept {
-    if (const auto since = alive_wall_ns_.load(); since != 0) {
-        const auto age = wall_ns() - since;
+    if (const auto since = alive_steady_ns_.load(); since != 0) {
+        const auto age = steady_ns() - since;
         return age > kPatience_ns ? static_cast<double>(age) * 1e-9 : 0;
     }
     const Time due = due_.load();
@@ -155,7 +155,7 @@ double Recorder::stuck_s() const noexcept {
     return late > kLate ? drivers::to_seconds(late) : 0;
 }
 
-void Recorder::alive() noexcept { alive_wall_ns_.store(wall_ns()); }
+void Recorder::alive() noexcept { alive_steady_ns_.store(steady_ns()); }
 
 void Recorder::loop() {
     while (!stop_.load()) {
@@ -179,7 +179,7 @@ void Recorder::loop() {
         show();
         const Time next = clock_.now() + kPeriod;
         due_.store(next);
-        alive_wall_ns_.store(0);
+        alive_steady_ns_.store(0);
         self_.wait_until(next);
     }
     due_.store(0);
@@ -255,19 +255,19 @@ void Recorder::refuse(const std::string& why) {
     lost_.stream = "samples";
     if (lost_.reason.empty()) lost_.reason = why;
     shown_.note = why;
-    retry_wall_ns_ = wall_ns() + kRetryNs;
+    retry_steady_ns_ = steady_ns() + kRetryNs;
 }
 
-/// Both kinds of files are on one disk: what it refuses and that it takes again is told once.
+/// Both kinds of files are on one disk: what it refuses and that it takes again is reported once.
 void Recorder::judge_disk() {
     const bool raw_good = !raw_ || raw_->good();
     if (writer_ && raw_good) {
         shown_.note.clear();
-        if (told_bad_.exchange(false))
+        if (reported_bad_.exchange(false))
             on_event_(Severity::info, fmt::format("writes again, to {}", shown_.file));
     } else {
         if (writer_) shown_.note = raw_->note();
-        if (!told_bad_.exchange(true)) on_event_(Severity::alarm, shown_.note);
+        if (!reported_bad_.exchange(true)) on_event_(Severity::alarm, shown_.note);
     }
 }
 
@@ -321,7 +321,7 @@ void Recorder::find_folder() {
                         "campaign {}: it will not replay as a whole",
                         folder_, head_->dwells_before, head_->name));
     }
-    // A folder that cannot be looked at is met again, and told, when the file is opened.
+    // A folder that cannot be looked at is met again, and reported, when the file is opened.
     std::error_code unknown;
     for (int i = 2; std::filesystem::exists(campaign_folder_, unknown); ++i)
         campaign_folder_ = fmt::format("{}-{}", base, i);
@@ -335,10 +335,10 @@ void Recorder::note(const std::string& path) {
             index_ = std::make_unique<Index>(
                 folder_, [this](const std::string& words) { on_event_(Severity::warning, words); });
         index_->note_file(path);
-        told_index_ = false;
+        reported_index_ = false;
     } catch (const std::exception& error) {
         index_.reset();
-        if (!std::exchange(told_index_, true))
+        if (!std::exchange(reported_index_, true))
             on_event_(Severity::warning,
                       fmt::format("index: {}; vibrig recover makes it anew", error.what()));
     }
@@ -364,7 +364,7 @@ void Recorder::take(Head& head) {
     const std::size_t going_on = head_->dwells_before;
     lost_ = {};
     at_risk_ = 0;
-    told_bad_ = false;
+    reported_bad_ = false;
     shown_ = {};
     shown_.folder = folder_;
     shown_.recording = true;
@@ -381,7 +381,7 @@ void Recorder::take(Head& head) {
                 note(campaign_folder_ + "/" + segment.file);
             },
             [this] { alive(); });
-    committed_wall_ns_ = wall_ns();
+    committed_steady_ns_ = steady_ns();
 }
 
 void Recorder::append_dwells(const std::string& line) {
@@ -463,14 +463,14 @@ void Recorder::look_around() {
 
 void Recorder::commit(bool all) {
     if (!head_) return;
-    const std::int64_t now = wall_ns();
-    if (!all && now - committed_wall_ns_ < static_cast<std::int64_t>(settings_.flush_s * 1e9))
+    const std::int64_t now = steady_ns();
+    if (!all && now - committed_steady_ns_ < static_cast<std::int64_t>(settings_.flush_s * 1e9))
         return;
-    committed_wall_ns_ = now;
+    committed_steady_ns_ = now;
     alive();
     if (raw_) raw_->flush();
     alive();
-    if (!writer_ && now >= retry_wall_ns_ && open_file()) {
+    if (!writer_ && now >= retry_steady_ns_ && open_file()) {
         lost_.stream = "samples";
         if (lost_.lost > 0) write_gap(std::exchange(lost_, {}));
     }

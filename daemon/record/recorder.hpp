@@ -45,7 +45,7 @@ class SentTap final : public drivers::CanPort {
 
 /// Writes campaigns to disk on a thread of its own: raw frames as candump logs, the rest as HDF5.
 /// Whoever feeds it never waits for the disk; what the disk refuses is counted and, once it writes
-/// again, told in the recording.
+/// again, noted in the recording.
 class Recorder {
   public:
     using Estimates = std::function<estimator::Estimate()>;
@@ -91,7 +91,7 @@ class Recorder {
     /// run; 0: it does. Any thread.
     [[nodiscard]] double stuck_s() const noexcept;
     /// The disk refuses, or it does not go on. Any thread.
-    [[nodiscard]] bool degraded() const noexcept { return told_bad_.load() || stuck_s() > 0; }
+    [[nodiscard]] bool degraded() const noexcept { return reported_bad_.load() || stuck_s() > 0; }
 
     static constexpr std::size_t kMostWaiting = 10'000;
 
@@ -146,12 +146,12 @@ class Recorder {
     int part_ = 0;  ///< files of this campaign so far
     std::unique_ptr<CampaignWriter> writer_;
     std::unique_ptr<Index> index_;  ///< null until it could be opened
-    bool told_index_ = false;
+    bool reported_index_ = false;
     std::unique_ptr<RawLog> raw_;
     std::deque<FrameRecord> late_sent_;
     /// What goes into the file once it can be written: few and small, unlike the samples.
     std::deque<std::variant<Order, Dwell, Swept, Played, EventRecord>> kept_;
-    std::int64_t committed_wall_ns_ = 0, retry_wall_ns_ = 0;
+    std::int64_t committed_steady_ns_ = 0, retry_steady_ns_ = 0;
     drivers::Time newest_sample_ = 0, estimate_at_ = 0, looked_around_at_ = 0;
     std::uint64_t estimate_samples_ = 0;
     Gap lost_;                   ///< samples that could not be written
@@ -159,10 +159,10 @@ class Recorder {
     bool commit_now_ = false;
     RecorderStatus shown_;
 
-    std::atomic<bool> told_bad_{false};  ///< set by its thread
+    std::atomic<bool> reported_bad_{false};  ///< set by its thread
     std::atomic<bool> stop_{false};
     /// When its thread last went on, in wall time; 0: it waits for something to do.
-    std::atomic<std::int64_t> alive_wall_ns_{0};
+    std::atomic<std::int64_t> alive_steady_ns_{0};
     std::atomic<drivers::Time> due_{0};  ///< when it will look again, in the daemon's time
     mutable std::mutex mutex_;
     std::deque<Entry> waiting_;

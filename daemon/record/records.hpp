@@ -57,8 +57,8 @@ struct Order {
     bool held_out = false;                ///< for verification
     estimator::RandomVibration random{};  ///< in place of a sine
     estimator::SweptSine sweep{};         ///< likewise
-    /// Under random vibration what was played, as the controller says: known after the dwell, and
-    /// its PSD at the table, Hz and g^2/Hz, as it came.
+    /// Under random vibration what was played, as the controller reports it: known after the dwell,
+    /// and its PSD at the table, Hz and g^2/Hz, as it came.
     std::optional<estimator::PlayedRandom> played{};
     std::vector<std::array<double, 2>> psd{};
     [[nodiscard]] estimator::DwellInfo dwell() const {
@@ -75,14 +75,14 @@ struct Played {
     std::vector<std::array<double, 2>> psd;
 };
 
-/// What the controller says of its frequency in a sweep.
+/// What the controller reports of its frequency in a sweep.
 struct SweptRow {
     drivers::Time time = 0;
     std::int32_t run = 0, position = 0;
     double frequency_hz = 0;
 };
 
-/// Of one sweep.
+/// Rows of one sweep.
 struct Swept {
     std::vector<SweptRow> rows;
 };

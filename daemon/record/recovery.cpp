@@ -40,7 +40,7 @@ std::vector<drivers::Sample> more_from_raw(const Campaign& part, Gap& gap, std::
     return more;
 }
 
-/// What was done and lost stands in the file's gaps: told from there, now and every time after.
+/// What was done and lost stands in the file's gaps: reported from there, now and every time after.
 void mend_last(const std::string& path) {
     File::open(path, File::Mode::mend).close();
     const Campaign part = read_part(path);

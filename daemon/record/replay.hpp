@@ -39,7 +39,7 @@ struct ReplayResult {
 void forget_noise(Campaign& campaign);
 
 using OnStep = std::function<void(std::size_t sample, const estimator::StepResult&)>;
-/// A sweep with what the controller said of its frequency, and the recorded samples.
+/// A sweep with what the controller reported of its frequency, and the recorded samples.
 [[nodiscard]] estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
                                                       const estimator::Settings& settings,
                                                       const RecordedDwell& dwell);

@@ -63,7 +63,7 @@ void Acquisition::stop() {
 
 void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
     shown_.in_hand = frames.size();
-    shown_.last_frames = wall_clock();
+    shown_.last_frames = steady_now();
     to_.interlock.arrived(shown_.last_frames);
     for (const auto& frame : frames) {
         --shown_.in_hand;
@@ -132,7 +132,7 @@ void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     if (batched_ == batch_.size()) push_batch();
 }
 
-/// A trip that an accelerometer has told leaves two to be believed, the table and it: that it is
+/// A trip that an accelerometer has shown leaves two to be believed, the table and it: that it is
 /// still afterwards proves nothing.
 void Acquisition::doubt_witness() noexcept {
     const Tripped trip = to_.interlock.latched();
@@ -200,7 +200,7 @@ void Acquisition::arm_timer() {
     timer_.expires_at(std::chrono::steady_clock::time_point(std::chrono::nanoseconds(deadline)));
     timer_.async_wait([this, deadline](const boost::system::error_code& error) {
         if (error) return;
-        to_.interlock.arrived(wall_clock());
+        to_.interlock.arrived(steady_now());
         const Time woken = clock_.now();
         shown_.lateness.add(woken - deadline);
         on_time(woken);

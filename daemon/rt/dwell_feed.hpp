@@ -32,7 +32,7 @@ class DwellFeed {
         begun_ = false;
         return summary;
     }
-    /// Of a dwell without a sample: the filter never hears of it.
+    /// Summary of a dwell without a sample, which the filter never gets.
     [[nodiscard]] estimator::DwellSummary none_of(
         const estimator::DwellInfo& dwell) const noexcept {
         estimator::DwellSummary summary;

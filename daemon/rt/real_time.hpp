@@ -14,7 +14,7 @@ namespace vibrig::rt {
 struct PageFaults {
     std::uint64_t major = 0, minor = 0;
 };
-/// Of the calling thread since it began; one system call.
+/// Page faults of the calling thread since it began; one system call.
 [[nodiscard]] PageFaults page_faults_of_this_thread() noexcept;
 
 /// Counts what was done later than a bound. One thread.
@@ -72,7 +72,7 @@ void keep_this_thread_to(int cpu) noexcept;
 [[nodiscard]] bool this_thread_is_fifo() noexcept;
 
 /// Sets up the calling thread and brings its stack into memory. What cannot be had is left as it
-/// is and told.
+/// is and reported.
 [[nodiscard]] ThreadSetup set_up_this_thread(const ThreadWishes& wishes);
 
 struct MemoryLock {
@@ -83,7 +83,7 @@ struct MemoryLock {
 /// Locks the memory of the process: all that is there now, and whatever comes once it has been
 /// touched. Before other threads begin.
 [[nodiscard]] MemoryLock lock_memory();
-/// Of all that is had from here on: a large block is the system's again as soon as it is freed,
+/// For all memory from here on: a large block is the system's again as soon as it is freed,
 /// small ones come from one heap. Before other threads begin, or they have theirs.
 void give_large_blocks_back();
 /// All that is free and was needed once; where memory is locked it stays.

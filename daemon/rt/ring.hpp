@@ -137,7 +137,7 @@ class Ring {
         for (std::size_t i = 1; i < records.size(); ++i) slots_[(at + i) & mask_].published_to = 0;
     }
 
-    /// A processor that is told to copy whole lines does not fetch them first, a tenth of a batch's
+    /// A processor that is made to copy whole lines does not fetch them first, a tenth of a batch's
     /// time; memcpy() does so from some length on alone. What checks memory accesses sees memcpy().
     static void copy(const T* from, std::size_t n, T* to) noexcept {
         std::size_t bytes = n * sizeof(T);

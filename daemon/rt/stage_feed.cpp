@@ -76,7 +76,7 @@ void StageFeed::take_velocity(const drivers::ReceivedFrame& received) noexcept {
     for (std::size_t i = 0; i < 2; ++i) {
         if (!is(velocity_[i].message, received.frame)) continue;
         const double value = proto::decode(*velocity_[i].signal, payload).value_or(std::nan(""));
-        // What the device itself says is none grows old.
+        // What the device itself reports as none grows old.
         if (!std::isfinite(value) || proto::out_of_range(*velocity_[i].signal, value)) continue;
         base_velocity_[i] = value;
         base_velocity_at_[i] = received.time;

@@ -61,7 +61,7 @@ struct StageFeedSettings {
 class StageFeed {
   public:
     static constexpr std::size_t kCapacity = 1024;  ///< of what was not taken yet
-    /// watched: samples, of whose coming the control thread is not told.
+    /// watched: samples, whose coming does not wake the control thread.
     enum class Mode : std::uint8_t { off, force, increments, samples, watched };
 
     /// Throws BindingError, std::invalid_argument without a block; the Dbc must outlive this.

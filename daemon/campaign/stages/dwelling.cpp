@@ -328,7 +328,7 @@ std::string Dwelling::other_level() const {
         table += reading.table_g * reading.table_g;
         ++tables;
     }
-    const auto told = [&](const char* where, double sum, double count, double rms_g) {
+    const auto mismatch = [&](const char* where, double sum, double count, double rms_g) {
         // As many independent values as there are readings, or as the band has.
         const double values =
             std::min(count, 2 * random.at_platform.bandwidth_hz * count * settings_.sample_s);
@@ -341,10 +341,10 @@ std::string Dwelling::other_level() const {
             where, rms_g * std::sqrt(over), rms_g, random.set_point.profile,
             random.set_point.level_db);
     };
-    std::string other = told("accelerometers of the platform show", platform,
-                             static_cast<double>(shown_.size()), expected_g);
+    std::string other = mismatch("accelerometers of the platform show", platform,
+                                 static_cast<double>(shown_.size()), expected_g);
     if (other.empty() && tables > 0)
-        other = told("accelerometer of the table shows", table, tables, table_g());
+        other = mismatch("accelerometer of the table shows", table, tables, table_g());
     return other;
 }
 

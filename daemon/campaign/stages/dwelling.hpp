@@ -51,9 +51,9 @@ class Dwelling : public Stage {
     [[nodiscard]] estimator::DwellInfo info() const;
     /// By the transmission as measured.
     [[nodiscard]] estimator::RandomVibration random_at_platform() const;
-    /// Of a sweep what the controller said of its frequency, s since the dwell began and Hz.
+    /// What the controller reported of a sweep's frequency, s since the dwell began and Hz.
     [[nodiscard]] const std::vector<std::array<double, 2>>& swept_hz() const { return swept_hz_; }
-    /// Of random vibration, by the controller's readings while it recorded; 0: there were none.
+    /// Rms of random vibration by the controller's readings while it recorded; 0: there were none.
     [[nodiscard]] double measured_g_rms() const {
         return readings_ > 0 ? std::sqrt(square_ / readings_) : 0;
     }

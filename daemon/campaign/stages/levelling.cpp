@@ -55,7 +55,7 @@ StageStep Levelling::measure(Time now) {
     return StageStep::going_on(now + kStagePoll);
 }
 
-/// A dwell is free drift: it begins only when the platform itself says that nothing is torqued.
+/// A dwell is free drift: it begins only when the platform itself reports that nothing is torqued.
 StageStep Levelling::confirm_zero(Time now) {
     constexpr Time kZeroTimeout = 2 * drivers::kSecond;
     Rig& rig = ports_.rig;

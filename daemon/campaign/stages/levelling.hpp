@@ -15,7 +15,7 @@ class Levelling : public Stage {
     struct Aim {
         Vector encoder_deg{};
         ZeroStatus zeros;  ///< of the accelerometers
-        /// Of the dwell that follows, to which the drift found belongs; none: no dwell does.
+        /// The dwell that follows, to which the drift found belongs; none: no dwell does.
         std::optional<std::pair<int, int>> run_and_position;
     };
 

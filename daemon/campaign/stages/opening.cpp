@@ -43,7 +43,7 @@ StageStep Opening::step(Time now) {
         check_.arrived(now);
         part_ = Part::measure;
     } else if (part_ == Part::measure) {
-        // While it slews a platform may say that it is not ready.
+        // While it slews a platform may report that it is not ready.
         if (auto why = platform_lacks(rig_.platform(), now); !why.empty())
             return StageStep::failed(std::move(why));
         check_.add(rig_.second().value_or(rt::MeanMotion{}));

@@ -12,7 +12,7 @@ namespace vibrig::campaign {
 
 /// At rest, before.
 inline constexpr drivers::Time kLook = 2 * drivers::kSecond;
-/// Of a stop that nobody saw end, s.
+/// Duration of a stop that nobody saw end, s.
 inline constexpr double kNever_s = 1e3;
 
 /// What the run at 0 g, the loop check and the safe-state proof act on and write into, and what is
@@ -34,7 +34,7 @@ class SmallLevel {
     StopMonitor& stop;
     LoopCheck& loop;
     SafetyProof& proof;
-    /// Of this check, peak at the table; 0: the controller runs, the table stands.
+    /// Level of this check, peak at the table; 0: the controller runs, the table stands.
     double level_g = 0;
 
     /// A proof by this person begins.

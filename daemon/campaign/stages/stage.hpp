@@ -52,7 +52,7 @@ inline constexpr drivers::Time kSilence = drivers::kSecond;
                                          drivers::Time now);
 /// A status older than that is no status.
 [[nodiscard]] bool platform_is_silent(const drivers::PlatformStatus& platform, drivers::Time now);
-/// By what the platform itself says.
+/// By what the platform itself reports.
 [[nodiscard]] bool torquing(const Rig& rig);
 /// Nothing is fed any more, and nothing is torqued.
 void let_go(Rig& rig);

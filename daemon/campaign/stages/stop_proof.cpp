@@ -172,12 +172,12 @@ std::string StopProof::cleared(Time now) {
 std::string StopProof::press(Time /*now*/) {
     auto& log = level_.ports.log;
     if (!std::exchange(begun_, true)) {
-        asked_wall_ = log.wall();
+        asked_steady_ = log.steady_now();
         log.event(Severity::warning,
                   fmt::format("proof: press the emergency stop{} now, within {:.0f} s",
                               level_.proof.named_button(), to_seconds(kPress)));
     }
-    return log.wall() - asked_wall_ > kPress ? "nobody pressed the emergency stop" : "";
+    return log.steady_now() - asked_steady_ > kPress ? "nobody pressed the emergency stop" : "";
 }
 
 /// The opened chain has tripped, or first the witnesses of the table's fall, between two looks at
@@ -224,12 +224,12 @@ void StopProof::look(bool tripped, const std::string& reason, Time now) {
         proof.row("emergency stop, the controller says fault", press_felt_);
         proof.record().emergency_stop = true;
         pressed_ = Pressed::open;
-        asked_wall_ = log.wall();
+        asked_steady_ = log.steady_now();
         if (reading.emergency_stop_open)
             log.event(Severity::warning, "proof: close the emergency-stop chain again");
     }
     if (pressed_ == Pressed::open) {
-        if (log.wall() - asked_wall_ > kPress)
+        if (log.steady_now() - asked_steady_ > kPress)
             return end_pressed("nobody closed the emergency-stop chain again");
         if (!reading.valid || reading.emergency_stop_open) return;
         pressed_ = Pressed::closed;

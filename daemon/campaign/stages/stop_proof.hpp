@@ -73,10 +73,10 @@ class StopProof : public Stage {
     StopTimes times_;
     bool press_wanted_ = false;
     Pressed pressed_ = Pressed::no;
-    drivers::Time pressed_at_ = 0;  ///< when that began
-    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
-    bool press_felt_ = false;       ///< by the controller, too
-    bool press_seen_ = false;       ///< by the chain's register
+    drivers::Time pressed_at_ = 0;    ///< when that began
+    drivers::Time asked_steady_ = 0;  ///< when a person was asked, by the steady clock
+    bool press_felt_ = false;         ///< by the controller, too
+    bool press_seen_ = false;         ///< by the chain's register
 };
 
 }  // namespace vibrig::campaign

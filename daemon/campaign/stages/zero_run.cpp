@@ -145,7 +145,7 @@ std::string ZeroRun::judge_run() {
     std::string why = unless_passed("the platform feels that the controller runs at 0 g");
     if (loop.noise().table_g > 0) {
         proof.row("at 0 g, table", "g", peak.table_g, 0, Excitation::kAtZero_g);
-        if (why.empty()) why = unless_passed("the table moves although it is told 0 g");
+        if (why.empty()) why = unless_passed("the table moves although 0 g is commanded");
     }
     proof.row("at 0 g, measured by the controller", "g", measured_g_, 0, Excitation::kAtZero_g);
     return why.empty() ? unless_passed("the controller measures more than 0 g") : why;

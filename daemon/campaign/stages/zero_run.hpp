@@ -9,7 +9,7 @@ namespace vibrig::campaign {
 
 /// Before anything shakes: a controller that nobody has seen run yet is run at 0 g, stopped by
 /// order, then left to its watchdog twice, once while it is read on, once with the link closed.
-/// What it says of itself is timed, and that neither table nor platform feels anything of it.
+/// What it reports of itself is timed, and that neither table nor platform feels anything of it.
 class ZeroRun : public Stage {
   public:
     explicit ZeroRun(SmallLevel& level) : level_(level) {}

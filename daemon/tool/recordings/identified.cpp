@@ -419,8 +419,8 @@ Found identify_campaign(const std::string& path, const std::string& config,
     found.profiles = configuration::numbered_kinds(loaded.configuration);
     for (const record::Order& order : campaign.orders) {
         if (!order.played || order.played->place == 0) continue;
-        found.psds.push_back(configuration::bands_told(loaded.configuration, order.random.profile,
-                                                       order.random.level_db, order.psd));
+        found.psds.push_back(configuration::reported_bands(
+            loaded.configuration, order.random.profile, order.random.level_db, order.psd));
     }
     return found;
 }

@@ -14,7 +14,7 @@ namespace vibrig::tool {
 /// A dwell that a result is tried on, and the name of the profile that shook it; none: a sine.
 struct HeldOut {
     estimator::DwellRow row;
-    /// Of what it shook with; of a random one whose PSD is known its own bands.
+    /// Kind of what it shook with; a random one whose PSD is known has its own bands.
     estimator::spectrum::Kind kind;
 };
 
@@ -26,7 +26,8 @@ struct Identified {
     bool simulated = false;                  ///< the rig was a program
     std::optional<dwells::Live> live;        ///< of a campaign that was identified anew at its end
     std::optional<SpectrumResult> spectrum;  ///< of rows enough, and of a campaign frequencies
-    /// Of a campaign planned for verification; all of a recording that is held out as a whole.
+    /// Dwells of a campaign planned for verification; all of a recording that is held out as a
+    /// whole.
     std::vector<HeldOut> held_out;
 };
 

@@ -13,7 +13,7 @@
 namespace vibrig {
 namespace {
 
-/// A service manager's socket, told to this process alone.
+/// A service manager's socket, known to this process alone.
 class ServiceManagerTest : public testing::Test {
   protected:
     ServiceManagerTest() {
@@ -31,8 +31,8 @@ class ServiceManagerTest : public testing::Test {
             ::unsetenv(variable);
         ::close(manager_);
     }
-    /// What it was told; empty: nothing.
-    std::string told() const {
+    /// What was reported to it; empty: nothing.
+    std::string reported() const {
         std::array<char, 512> text{};
         const ssize_t size = ::recv(manager_, text.data(), text.size(), MSG_DONTWAIT);
         return size < 0 ? "" : std::string(text.data(), static_cast<std::size_t>(size));
@@ -41,21 +41,21 @@ class ServiceManagerTest : public testing::Test {
     int manager_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 };
 
-TEST_F(ServiceManagerTest, IsToldInItsOwnWords) {
+TEST_F(ServiceManagerTest, IsReportedInItsOwnWords) {
     const ServiceManager service;
     service.ready("idle");
-    EXPECT_EQ(told(), "READY=1\nSTATUS=idle");
+    EXPECT_EQ(reported(), "READY=1\nSTATUS=idle");
     service.status("recording");
-    EXPECT_EQ(told(), "STATUS=recording");
+    EXPECT_EQ(reported(), "STATUS=recording");
     service.alive();
-    EXPECT_EQ(told(), "WATCHDOG=1");
+    EXPECT_EQ(reported(), "WATCHDOG=1");
     service.reloading();
-    EXPECT_EQ(told().find("RELOADING=1\nMONOTONIC_USEC="), 0U);
+    EXPECT_EQ(reported().find("RELOADING=1\nMONOTONIC_USEC="), 0U);
     service.stopping();
-    EXPECT_EQ(told(), "STOPPING=1\nSTATUS=stopping");
+    EXPECT_EQ(reported(), "STOPPING=1\nSTATUS=stopping");
 }
 
-TEST_F(ServiceManagerTest, IsToldTwiceInTheTimeThatItWaits) {
+TEST_F(ServiceManagerTest, IsNotifiedTwiceInTheTimeThatItWaits) {
     EXPECT_EQ(ServiceManager().period_s(), 0) << "it does not wait";
     ::setenv("WATCHDOG_USEC", "3000000", 1);
     EXPECT_EQ(ServiceManager().period_s(), 1.5);
@@ -68,7 +68,7 @@ TEST_F(ServiceManagerTest, IsToldTwiceInTheTimeThatItWaits) {
 TEST_F(ServiceManagerTest, OneThatHangsHoldsNobodyUp) {
     const ServiceManager service;
     for (int n = 0; n < 10'000; ++n) service.alive();  // more than its socket holds
-    EXPECT_EQ(told(), "WATCHDOG=1");
+    EXPECT_EQ(reported(), "WATCHDOG=1");
 }
 
 TEST_F(ServiceManagerTest, WithoutOneNothingHappens) {
@@ -79,7 +79,7 @@ TEST_F(ServiceManagerTest, WithoutOneNothingHappens) {
     service.ready("idle");
     ::setenv("NOTIFY_SOCKET", ("/" + std::string(200, 'x')).c_str(), 1);
     service.ready("idle");
-    EXPECT_EQ(told(), "");
+    EXPECT_EQ(reported(), "");
 }
 
 }  // namespace

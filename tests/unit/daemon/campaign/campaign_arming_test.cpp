@@ -17,7 +17,7 @@ struct ArmingTest : CampaignTest {
         remake();
     }
     void remake() {
-        this->wall_clock = [this] { return wall; };
+        this->steady_clock = [this] { return wall; };
         make();
         run_for(3);
     }
@@ -93,7 +93,7 @@ TEST_F(ArmingTest, IsNamedWhenAnotherPersonStarts) {
     ASSERT_TRUE(order(Kind::arm).accepted);
     EXPECT_EQ(order(Kind::start, "Grace").message, "campaign started, armed by Ada");
     EXPECT_EQ(status().started_by, "Grace");
-    // AND a second start is told what is going on
+    // AND a second start is refused with what is going on
     const auto again = order(Kind::start, "Ada");
     EXPECT_FALSE(again.accepted);
     EXPECT_EQ(again.message, "a campaign is running, started by Grace");

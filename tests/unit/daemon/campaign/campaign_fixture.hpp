@@ -53,7 +53,7 @@ struct CampaignTest : testing::Test {
     bool disobeyed = false;
     Proving proving = Proving::nothing;
     std::int64_t utc_ns = 0;
-    std::function<Time()> wall_clock;        ///< people's; none: the machine's
+    std::function<Time()> steady_clock;      ///< people's; none: the machine's
     std::function<rt::MeanMotion()> second;  ///< of force and angles; none: nobody asks
     double slew_started_at = -1;
     std::size_t frames_seen = 0;
@@ -86,8 +86,8 @@ struct CampaignTest : testing::Test {
             return test.think(here, elapsed_s);
         }
         std::string resume_gate() const override { return test.gate; }
-        Played played(const ToldPsd& psd) override {
-            test.told.push_back(psd);
+        Played played(const ReportedPsd& psd) override {
+            test.reported_psds.push_back(psd);
             return test.played;
         }
         void end(bool c) override {
@@ -107,7 +107,9 @@ struct CampaignTest : testing::Test {
         }
         void proved(const ProofRecord& record) override { test.proofs.push_back(record); }
         std::int64_t utc_ns() const override { return test.utc_ns; }
-        Time wall() const override { return test.wall_clock ? test.wall_clock() : Log::wall(); }
+        Time steady_now() const override {
+            return test.steady_clock ? test.steady_clock() : Log::steady_now();
+        }
     } log_port{*this};
 
     void make() {
@@ -187,7 +189,7 @@ struct CampaignTest : testing::Test {
     std::vector<double> elapsed;
     std::vector<StopDone> stops_done;
     std::vector<estimator::DwellInfo> infos_done;
-    std::vector<ToldPsd> told;
+    std::vector<ReportedPsd> reported_psds;
     Played played;
     std::vector<ProofRecord> proofs;
     int thinking_steps = 0;

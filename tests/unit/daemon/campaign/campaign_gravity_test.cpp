@@ -8,7 +8,7 @@
 namespace vibrig::campaign {
 namespace {
 
-TEST_F(WatchedCampaign, TellsWhatTheTableIsToDoAsItIsTold) {
+TEST_F(WatchedCampaign, ReportsWhatTheTableIsToDoWhenItIsCommanded) {
     settings.table_g = {9};
     settings.positions_deg = {{0, 0, 0}, {90, 0, 0}};
     make();
@@ -64,30 +64,30 @@ TEST_F(WatchedCampaign, NothingIsRampedWhereGravityIsNotWhereTheEncodersSay) {
     EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
 }
 
-TEST_F(WatchedCampaign, AVibrationThatIsNotVerticalIsToldAndPausesAfterItsDwell) {
+TEST_F(WatchedCampaign, AVibrationThatIsNotVerticalIsReportedAndPausesAfterItsDwell) {
     watched = true;
     make();
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
     ASSERT_TRUE(run_until(CampaignState::recording, 100));
     EXPECT_TRUE(events.empty() || events.back().find("off the vertical") == std::string::npos);
-    // WHEN a third of the vibration goes across in one second THEN nothing is told
+    // WHEN a third of the vibration goes across in one second THEN there is no warning
     across = 1.0 / 3;
     run_for(1);
     across = 0;
     run_for(2);
-    const auto told = [this] {
+    const auto warned = [this] {
         return std::ranges::count_if(events, [](const std::string& event) {
             return event.find("is 18.4 deg off the vertical") == event.npos
                        ? false
                        : event.starts_with("the vibration of");
         });
     };
-    EXPECT_EQ(told(), 0);
-    // WHEN it stays THEN that is told within three seconds
+    EXPECT_EQ(warned(), 0);
+    // WHEN it stays THEN there is a warning within three seconds
     across = 1.0 / 3;
     run_for(3);
-    EXPECT_EQ(told(), 1);
+    EXPECT_EQ(warned(), 1);
     // and the campaign pauses at rest when the dwell is over
     ASSERT_TRUE(run_until(CampaignState::paused, 300)) << status().reason;
     EXPECT_EQ(orders.size(), 1U);
@@ -98,7 +98,7 @@ TEST_F(WatchedCampaign, AVibrationThatIsNotVerticalIsToldAndPausesAfterItsDwell)
     across = 0;
     ASSERT_TRUE(command(Kind::resume).accepted);
     EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
-    EXPECT_EQ(told(), 1);
+    EXPECT_EQ(warned(), 1);
 }
 
 TEST_F(WatchedCampaign, AMeanForceThatIsNotOneGIsNotRampedUpon) {

@@ -19,7 +19,7 @@ TEST_F(CampaignTest, IsNotDoneWhileTheTableMovesWhateverTheControllerSays) {
     EXPECT_FALSE(campaign->done(now));
     EXPECT_FALSE(disobeyed);
     run_for(0.4);
-    // THEN the stop is told as not obeyed after 3 s, and never as confirmed
+    // THEN the stop is reported as not obeyed after 3 s, and never as confirmed
     EXPECT_TRUE(disobeyed);
     EXPECT_THAT(events, testing::Contains(testing::AllOf(
                             testing::HasSubstr("stop not obeyed"), testing::HasSubstr("Ada"),

@@ -200,7 +200,7 @@ TEST_F(StagesTest, LevelsBeforeEachPositionAndLetsThePlatformDriftFreelyDuringTh
     // AND the drift was found: first and second channel lie across the vertical
     const auto found = status().levelling.drift_deg_h;
     EXPECT_NEAR(std::hypot(found[0], found[1]), std::hypot(drift[0], drift[2]), 0.2);
-    // AND told as what the platform does along either direction, within what it says of itself
+    // AND reported as what the platform does along either direction, within what it says of itself
     ASSERT_EQ(drifts.size(), 2U);
     EXPECT_EQ(drifts[1].position, 2);
     EXPECT_LT(drifts[1].sigma_deg_h, 0.5);

@@ -9,7 +9,7 @@ TEST_F(CampaignTest, NothingMovesBeforeANamedPersonArmsAndStarts) {
     EXPECT_FALSE(command(Kind::start).accepted);
     EXPECT_FALSE(campaign->command({Kind::arm, "", ""}, now).accepted);
     run_for(30);
-    // THEN neither the shaker nor the gimbals were told anything
+    // THEN neither the shaker nor the gimbals got a command
     EXPECT_TRUE(shaker.requests.empty());
     EXPECT_TRUE(port.frames.empty());
 }
@@ -276,7 +276,7 @@ TEST_F(CampaignTest, RunsThePlanFilesStopsInTheirOrder) {
     EXPECT_EQ(status().progress, 1.0);
 }
 
-TEST_F(CampaignTest, AnAdaptiveCampaignRepeatsFlaggedDwellsAndEndsWhenToldTo) {
+TEST_F(CampaignTest, AnAdaptiveCampaignRepeatsFlaggedDwellsAndEndsWhenAskedTo) {
     // GIVEN two dwells to be chosen, of which the first is flagged
     settings.adaptive = true;
     stops_to_choose = {{{0, 0, 45}, 9}, {{0, 0, 90}, 0}};
@@ -462,7 +462,7 @@ TEST_F(CampaignTest, TellsTheFirstDwellAfterThePowerOfTheGyrosWasLost) {
         ASSERT_TRUE(command(Kind::arm).accepted);
         ASSERT_TRUE(command(Kind::resume).accepted);
         ASSERT_TRUE(run_until(CampaignState::finished, 300));
-        // THEN the dwell that comes first is told so, no other
+        // THEN the dwell that comes first is marked so, no other
         ASSERT_EQ(orders.size(), 2U);
         EXPECT_EQ(orders[0].dwell.power_lost, lost);
         EXPECT_FALSE(orders[1].dwell.power_lost);

@@ -43,7 +43,7 @@ TEST(GravityWatch, ARightRigWithTheErrorsOfACommissionedOneIsLetWhereverItStands
             for (double& angle : second.angle) angle += between(-0.03, 0.03) * kRadiansPerDegree;
             watch.next_position();
             const auto verdict = watch.judge(second, rig.accelerometer_zero_g, true);
-            EXPECT_FALSE(verdict.told) << watch.words();
+            EXPECT_FALSE(verdict.warned) << watch.words();
         }
     }
 }
@@ -76,13 +76,13 @@ TEST(GravityWatch, TheVibrationIsAlongTheVerticalOfTheEncodersUpToAQuarterAcross
             const auto verdict = watch.judge(second, rig.accelerometer_zero_g, false);
             EXPECT_NEAR(verdict.vibration_deg, std::atan(share) / kRadiansPerDegree, 1e-6);
             EXPECT_NEAR(verdict.vibration_g, 5 * std::hypot(1, share), 1e-9);
-            EXPECT_EQ(verdict.vibration_told, share > 0.27) << watch.vibration_words();
-            EXPECT_FALSE(verdict.told) << "gravity is where it should be";
+            EXPECT_EQ(verdict.vibration_off, share > 0.27) << watch.vibration_words();
+            EXPECT_FALSE(verdict.warned) << "gravity is where it should be";
         }
         // what is too small to have a direction has none
         auto second = second_at(rig, {0, 0, 0});
         second.cosine = {0.2, 0, 0};
-        EXPECT_FALSE(watch.judge(second, rig.accelerometer_zero_g, false).vibration_told);
+        EXPECT_FALSE(watch.judge(second, rig.accelerometer_zero_g, false).vibration_off);
     }
 }
 
@@ -144,14 +144,14 @@ TEST(GravityWatch, OfASizeThatIsWrongOnlyWhatChangesSizesIsSuspected) {
 
 TEST(GravityWatch, TellsBeforeItRefuses) {
     estimator::Settings truth, believed;
-    for (const auto& [off, told, refused] : {std::tuple{0.19, false, false},
-                                             {0.21, true, false},
-                                             {0.49, true, false},
-                                             {0.51, true, true}}) {
+    for (const auto& [off, warned, refused] : {std::tuple{0.19, false, false},
+                                               {0.21, true, false},
+                                               {0.49, true, false},
+                                               {0.51, true, true}}) {
         truth.encoder_zero_deg = {off, 0, 0};
         GravityWatch watch(believed, {});
         const auto verdict = watch.judge(second_at(truth, {45, 0, 0}), {}, true);
-        EXPECT_EQ(verdict.told, told) << off;
+        EXPECT_EQ(verdict.warned, warned) << off;
         EXPECT_EQ(verdict.refused, refused) << off;
         EXPECT_NEAR(verdict.angle_deg, off, 1e-9);
     }

@@ -235,10 +235,10 @@ TEST(ProofInStep, ADamagedOneIsNamedByPlaceValueAndExpectation) {
     EXPECT_EQ(why, "in_step[0].motion_arcsec_g: found null, expected a number from 0");
 }
 
-TEST(InStepWatch, ReadsSamplesOfWhoseComingNobodyIsTold) {
+TEST(InStepWatch, ReadsSamplesWhoseComingNotifiesNobody) {
     struct Control final : drivers::Waiter {
-        int told = 0;
-        void notify() noexcept override { ++told; }
+        int notified = 0;
+        void notify() noexcept override { ++notified; }
         bool wait_until(Time) noexcept override { return false; }
     } control;
     const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
@@ -252,7 +252,7 @@ TEST(InStepWatch, ReadsSamplesOfWhoseComingNobodyIsTold) {
         for (rt::Motion motion; feed.pop(motion);) came += motion.good ? 1 : 0;
     }
     EXPECT_EQ(came, 20);
-    EXPECT_EQ(control.told, 10);
+    EXPECT_EQ(control.notified, 10);
 }
 
 /// A campaign of two sines, on samples that a test makes.

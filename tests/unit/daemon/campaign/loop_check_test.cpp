@@ -57,7 +57,7 @@ TEST(LoopCheck, PadsAnswerAnotherFrequencyByTheirLaw) {
     EXPECT_NEAR(low, 1.5 / (2.5 * 256 / 225 - 1), 1e-9);
     const double x = (13.0 / 9 + std::sqrt(169.0 / 81 + 80.0 / 81)) / (8.0 / 9) * 256 / 225;
     EXPECT_NEAR(high, 1.5 * std::sqrt((1 + x) / ((1 - x) * (1 - x) + x)), 1e-9);
-    EXPECT_LT(high * 1.05, 1) << "a table that keeps its frequency is told from it";
+    EXPECT_LT(high * 1.05, 1) << "a table that keeps its frequency is distinguished from it";
     EXPECT_EQ(isolator_ratio(1, 15, 16), (std::array<double, 2>{1, 1}));
 }
 

@@ -13,7 +13,7 @@
 
 namespace vibrig::campaign {
 
-/// A platform that does what it is told and drifts when it is let go, held against a
+/// A platform that does what is commanded and drifts when it is let go, held against a
 /// configuration that may be another rig's.
 inline constexpr double kOpeningRad = std::numbers::pi / 180;
 

@@ -73,10 +73,10 @@ TEST_F(StopMonitorTest, AControllerThatReadsZeroProvesNothing) {
     EXPECT_TRUE(monitor.unsettled(now));
     news = News::none;
     run(5, &news);
-    EXPECT_EQ(news, News::none) << "told once";
+    EXPECT_EQ(news, News::none) << "reported once";
 }
 
-TEST_F(StopMonitorTest, ATableThatMovesUncommandedIsToldWhateverTheControllerReads) {
+TEST_F(StopMonitorTest, ATableThatMovesUncommandedIsReportedWhateverTheControllerReads) {
     // GIVEN a stop that was confirmed, and a contactor that closes by itself afterwards
     shake(5);
     shaker.stop_now();
@@ -88,7 +88,7 @@ TEST_F(StopMonitorTest, ATableThatMovesUncommandedIsToldWhateverTheControllerRea
     const double took_s = run(10, &news);
     EXPECT_EQ(news, News::uncommanded);
     EXPECT_LE(took_s, safety::kUnarmedMotion_s + 0.6) << "the window of rest and a second";
-    // THEN it is told once, and again when it comes again
+    // THEN it is reported once, and again when it comes again
     news = News::none;
     run(5, &news);
     EXPECT_EQ(news, News::none);

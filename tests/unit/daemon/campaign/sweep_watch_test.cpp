@@ -42,7 +42,7 @@ double hz_per_s(const SweptSine& of, double hz) {
     return hz * std::abs(std::log(of.to_hz / of.from_hz)) / of.seconds;
 }
 
-/// The level is there 3 s before the dwell. What it is told, and when in s; empty: nothing.
+/// The level is there 3 s before the dwell. What is commanded, and when in s; empty: nothing.
 std::pair<std::string, double> watched(const SweptRide& ride) {
     rt::DwellOrder order;
     order.from = 100 * kSecond;
@@ -86,7 +86,7 @@ TEST(SweepBounds, AreTheTheorys) {
     EXPECT_NEAR(slow.begins_s(), 8 + 2 * 2.39 / (1 - 0.0597), 0.02);
     EXPECT_NEAR(slow.late_s(120, 100), 0.2 + 2.39 + 0.40 + 5.97, 0.02);
     EXPECT_NEAR(slow.dwell_s(), 13.08 + 0.2 + 0.40 + 300 / (1 - 0.0597), 0.1);
-    // As it is polled, told and stated.
+    // As it is polled, commanded and stated.
     const SweptBy other{2, 0.1, 0.5, 0.1, 0.1};
     const SweepBounds coarse({20, 120, 300}, other);
     EXPECT_NEAR(coarse.off_hz(), kUnseen_hz + 0.05, 1e-3);

@@ -106,10 +106,10 @@ class ZerosAtARate : public testing::TestWithParam<double> {
         truth_.slew_kick_g = 0;
     }
 
-    /// Of a level accelerometer's zero over that of a mean: it has to be told from a tilt that
-    /// turns beneath it. By least squares c of c + A exp(-i psi) has 1 / (1 - |mean exp(i psi)|^2)
-    /// times the variance of a mean.
-    static double told_from_tilt() {
+    /// Of a level accelerometer's zero over that of a mean: it has to be distinguished from a tilt
+    /// that turns beneath it. By least squares c of c + A exp(-i psi) has 1 / (1 - |mean exp(i
+    /// psi)|^2) times the variance of a mean.
+    static double distinguished_from_tilt() {
         double psi_deg = 0, way = 1, cosine = 0, sine = 0;
         constexpr int kSteps = 6000;
         for (int i = 0; i < kSteps; ++i) {
@@ -130,8 +130,8 @@ TEST_P(ZerosAtARate, AreAsUncertainAsTheNoiseOfSoManySamples) {
     // z is the mean of what its accelerometer shows either way up, its scale is their difference;
     // likewise x and y.
     const double mean_mg = 1e3 * kNoise_g / std::sqrt(2 * kRun_s * GetParam());
-    const std::array<double, 3> theory_mg{mean_mg * told_from_tilt(), mean_mg * told_from_tilt(),
-                                          mean_mg};
+    const std::array<double, 3> theory_mg{mean_mg * distinguished_from_tilt(),
+                                          mean_mg * distinguished_from_tilt(), mean_mg};
     // The slews begin in the first of 60 updates. Tilts and gains of the level axes that are
     // estimated beside their zeros make these less sure than that, the more the less the noise.
     const std::array<double, 3> at_most{1.15, 1.15, 1.03};

@@ -259,7 +259,7 @@ TEST(Together, ContradictionsAreRefused) {
     EXPECT_THAT(complaint("campaign.ready_timeout_s = 30", true), HasSubstr("a window shorter"));
 }
 
-TEST(Together, AMistakeInAValueIsToldOnce) {
+TEST(Together, AMistakeInAValueIsReportedOnce) {
     // GIVEN a frequency that is no frequency
     const std::string text = complaint("vibration.frequency_hz = nan", true);
     // THEN limits, aliasing and resonance at it are not discussed

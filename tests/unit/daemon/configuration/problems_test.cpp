@@ -83,7 +83,7 @@ TEST(Errors, AHundredAreShownAndTheOthersCounted) {
     EXPECT_EQ(lines.back(), "rig.toml: and 50 more");
 }
 
-TEST(Errors, BrokenTomlIsToldWithLineAndColumn) {
+TEST(Errors, BrokenTomlIsReportedWithLineAndColumn) {
     EXPECT_THAT(complaint("[site]\nlatitude_deg = \n"), StartsWith("rig.toml:2:16: not TOML: "));
     EXPECT_THAT(complaint("[site]\nlatitude_deg = 1\nlatitude_deg = 2\n"),
                 StartsWith("rig.toml:3:"));

@@ -12,7 +12,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// What a controller says that it played, at the table, in place of what was to be played.
+/// What a controller reports as played, at the table, in place of what was to be played.
 TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
     const plant::TemporaryFolder folder;
     const std::string path = folder.file("plan.json"), psd = folder.file("psd.json");

@@ -25,7 +25,7 @@ TEST(SpectrumKeys, AProfileIsTakenWithItsTable) {
     EXPECT_TRUE(c.profiles[0].at_table);
 }
 
-TEST(SpectrumKeys, EachBadProfileIsToldWithPlaceValueAndWhatWasExpected) {
+TEST(SpectrumKeys, EachBadProfileIsReportedWithPlaceValueAndWhatWasExpected) {
     const auto said = [](const std::string& lines) {
         return complaint(profile_with(lines), false);
     };
@@ -127,7 +127,7 @@ TEST(AccelerometerKeys, AResponseIsTakenAsItIsStated) {
     EXPECT_THAT(shown, HasSubstr("accelerometer.skew_ms"));
 }
 
-TEST(AccelerometerKeys, BadOnesAreToldWithPlaceValueAndWhatWasExpected) {
+TEST(AccelerometerKeys, BadOnesAreReportedWithPlaceValueAndWhatWasExpected) {
     const auto said = [](const std::string& lines) {
         return complaint("[accelerometer]\n" + lines, false);
     };

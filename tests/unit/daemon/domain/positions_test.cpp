@@ -7,7 +7,7 @@
 namespace vibrig {
 namespace {
 
-TEST(StopDone, KindsOfVibrationAreToldApart) {
+TEST(StopDone, KindsOfVibrationAreDistinguished) {
     StopDone reference, higher, random, up, down;
     higher.frequency_hz = 65.1;
     random.profile = 4;

@@ -130,9 +130,9 @@ std::vector<Measured> planned() {
 
 /// A campaign that has dwells of each kind: with angles that were lost, one three times as noisy as
 /// the others, one that no sample came of, one held out, one under random vibration whose PSD the
-/// controller told, one whose PSD was refused, and a sweep.
+/// controller reported, one whose PSD was refused, and a sweep.
 std::vector<Measured> measured() {
-    constexpr std::size_t kNoisy = 12, kSilent = 14, kHeldOut = 16, kTold = 18, kRefused = 19,
+    constexpr std::size_t kNoisy = 12, kSilent = 14, kHeldOut = 16, kReported = 18, kRefused = 19,
                           kSwept = 20;
     using Word = estimator::PlayedRandom::Word;
     Synthetic synthetic;
@@ -145,14 +145,14 @@ std::vector<Measured> measured() {
         if (i == kNoisy) synthetic.add_walk(dwell.samples, 3 * kWalk);
         if (i == kSilent) dwell.samples.clear();
         dwell.info.held_out = dwell.stop.held_out = i == kHeldOut;
-        if (i == kTold || i == kRefused) {
+        if (i == kReported || i == kRefused) {
             dwell.samples = synthetic.random();
             dwell.info.random = {4, 100, 0.02, 200, 1, 0};
             dwell.stop.profile = 1;
             dwell.played.emplace();
-            dwell.played->word = i == kTold ? Word::good : Word::refused;
+            dwell.played->word = i == kReported ? Word::good : Word::refused;
         }
-        if (i == kTold) {
+        if (i == kReported) {
             dwell.played->random = {4.2, 95, 0.01, 200, 1, 0};
             dwell.played->place = 1;
             dwell.stop.psd = {{10, 0.021}, {200, 0.021}};
@@ -260,7 +260,7 @@ DwellBook watched_book() {
 /// The daemon's estimator thread with a book, and what its control thread does at each end.
 class Live {
   public:
-    /// `journal`: is told what was fed and what came of it. `recording`: likewise.
+    /// `journal`: gets what was fed and what came of it. `recording`: likewise.
     Live(DwellBook& book, journal::Journal* journal, record::CampaignWriter* recording)
         : book_(book), journal_(journal), recording_(recording) {
         if (journal_) stage_.feed_to(journal_->fed());
@@ -327,19 +327,21 @@ class Live {
     /// As a dwell's stage makes it, while the samples come.
     [[nodiscard]] static estimator::spectrum::Sweep sweep_of(const Measured& dwell) {
         estimator::spectrum::ReadSweep sweep({}, dwell.info.run, dwell.info.position);
-        std::size_t told = 0;
+        std::size_t next_reading = 0;
         for (const auto& sample : dwell.samples) {
             if (sample.time >= dwell.from + kDwell) break;
             const auto measurement = rt::measurement_of(sample, dwell.from, dwell.zero_g);
-            while (told < dwell.stop.swept_hz.size() &&
-                   dwell.stop.swept_hz[told][0] <= measurement.time_s) {
-                sweep.frequency(dwell.stop.swept_hz[told][0], dwell.stop.swept_hz[told][1]);
-                ++told;
+            while (next_reading < dwell.stop.swept_hz.size() &&
+                   dwell.stop.swept_hz[next_reading][0] <= measurement.time_s) {
+                sweep.frequency(dwell.stop.swept_hz[next_reading][0],
+                                dwell.stop.swept_hz[next_reading][1]);
+                ++next_reading;
             }
             sweep.add(measurement);
         }
-        for (; told < dwell.stop.swept_hz.size(); ++told)
-            sweep.frequency(dwell.stop.swept_hz[told][0], dwell.stop.swept_hz[told][1]);
+        for (; next_reading < dwell.stop.swept_hz.size(); ++next_reading)
+            sweep.frequency(dwell.stop.swept_hz[next_reading][0],
+                            dwell.stop.swept_hz[next_reading][1]);
         return sweep.finish();
     }
     void record(const Measured& dwell) {

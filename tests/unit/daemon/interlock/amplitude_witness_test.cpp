@@ -1,4 +1,4 @@
-// The table does what it was told, as the accelerometers see it: the simulated rig with a
+// The table does what was commanded, as the accelerometers see it: the simulated rig with a
 // controller that lies, and with everything that is no reason to stop.
 #include "daemon/interlock/amplitude_witness.hpp"
 
@@ -91,7 +91,7 @@ struct WitnessedRig {
         EXPECT_EQ(rig.shaker().write(address, std::span(values.begin(), values.size())),
                   plant::ShakerController::Answer::accepted);
     }
-    /// The registers are written `late_s` after the interlock has been told.
+    /// The registers are written `late_s` after the interlock has the ramp.
     void ask(double table_g, double ramp_s, double late_s = 0) {
         const auto up = rig.platform().up_in_platform();
         interlock.command(0, degrees());
@@ -137,7 +137,7 @@ struct WitnessedRig {
     }
 };
 
-TEST(AmplitudeWitness, ATableThatDoesTwiceWhatItWasToldStopsWithinHalfASecondOfTheLevelArmed) {
+TEST(AmplitudeWitness, ATableThatDoesTwiceWhatWasCommandedStopsWithinHalfASecondOfTheLevelArmed) {
     auto truth = quiet_truth();
     truth.shaker_lies.amplitude_scaled = 2;
     WitnessedRig rig(truth);
@@ -389,7 +389,7 @@ TEST(AmplitudeWitness, SeesTheAmplitudeAtAnyFrequencyAndRateThatAConfigurationMa
             now.controller_began = 1;
             now.limit_g = 12;
             now.steady = true;
-            int told = 0;
+            int shown = 0;
             for (Time t = kSecond; drivers::to_seconds(t) < 1 + 6 * witness.window_s();
                  t += period) {
                 now.now = t;
@@ -397,11 +397,11 @@ TEST(AmplitudeWitness, SeesTheAmplitudeAtAnyFrequencyAndRateThatAConfigurationMa
                 verdict = witness.verdict(now);
                 EXPECT_FALSE(verdict.off_command.wrong) << one.hz << " Hz at " << one.rate;
                 if (verdict.seen_g[0] < 0) continue;
-                ++told;
+                ++shown;
                 EXPECT_NEAR(verdict.seen_g[0], 6, 0.01) << one.hz << " Hz at " << one.rate;
                 EXPECT_NEAR(verdict.seen_g[1], 6, 0.01) << one.hz << " Hz at " << one.rate;
             }
-            EXPECT_GT(told, 0) << one.hz << " Hz at " << one.rate;
+            EXPECT_GT(shown, 0) << one.hz << " Hz at " << one.rate;
         }
     }
 }
@@ -412,7 +412,7 @@ TEST(AmplitudeWitness, HasNoRateThatNobodyStated) {
 
 /// A sweep at 6 g, 0.5 of it at the platform and 1 of it beyond 60 Hz; `scaled`: what the table
 /// does from 10 s on. When it was found wrong, s, negative: never; and for how long nothing was
-/// told.
+/// shown.
 struct Swept {
     double wrong_s = -1, blind_s = 0, farthest_g = 0;
 };
@@ -431,7 +431,7 @@ Swept swept(double from_hz, double to_hz, double rate_hz, double scaled) {
     for (std::size_t i = 0; i < Sweep::kAlong; ++i)
         sweep.transmission[i] = 0.5 + 0.5 * static_cast<double>(i) / (Sweep::kAlong - 1);
     Swept out;
-    double phase = 0, told = 0, all = 0;
+    double phase = 0, shown = 0, all = 0;
     for (Time t = kSecond; drivers::to_seconds(t - kSecond) < kBegins_s + kLasts_s; t += period) {
         const double since = drivers::to_seconds(t - kSecond);
         if (since >= kBegins_s && sweep.octaves_per_s == 0) {
@@ -452,12 +452,12 @@ Swept swept(double from_hz, double to_hz, double rate_hz, double scaled) {
         if (!witness.add(sample)) continue;
         const auto verdict = witness.verdict(now);
         all += 1;
-        told += verdict.seen_g[0] >= 0 ? 1 : 0;
+        shown += verdict.seen_g[0] >= 0 ? 1 : 0;
         if (verdict.seen_g[0] >= 0 && since > 1)
             out.farthest_g = std::max(out.farthest_g, std::abs(verdict.seen_g[0] - 6));
         if (verdict.off_command.wrong && out.wrong_s < 0) out.wrong_s = since;
     }
-    out.blind_s = (1 - told / all) * (kBegins_s + kLasts_s);
+    out.blind_s = (1 - shown / all) * (kBegins_s + kLasts_s);
     return out;
 }
 

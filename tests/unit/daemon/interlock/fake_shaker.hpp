@@ -39,7 +39,7 @@ class FakeShaker final : public drivers::Shaker {
         psd_asked_at_rest = psd_asked_at_rest && now.at_rest();
         return ++psds_asked;
     }
-    [[nodiscard]] drivers::ShakerPsd psd() const override { return psd_told; }
+    [[nodiscard]] drivers::ShakerPsd psd() const override { return psd_answer; }
     void on_reading(std::function<void()>) override {}
     void shut_down() noexcept override {}
 
@@ -56,13 +56,13 @@ class FakeShaker final : public drivers::Shaker {
         now.sweep.reset();
         if (wanted.sweep) {
             const double minutes = drivers::to_seconds(time - runs_since(time)) / 60;
-            const drivers::SweepSetPoint& told = *wanted.sweep;
-            const double octaves = sweep_rate_scaled * told.octaves_per_minute *
+            const drivers::SweepSetPoint& commanded = *wanted.sweep;
+            const double octaves = sweep_rate_scaled * commanded.octaves_per_minute *
                                    std::max(0.0, minutes - sweep_rests_s / 60);
-            const bool up = told.to_hz > told.from_hz;
-            const double hz = told.from_hz * std::exp2(up ? octaves : -octaves);
-            now.sweep = {true, told.from_hz, told.to_hz, told.octaves_per_minute,
-                         up ? std::min(hz, told.to_hz) : std::max(hz, told.to_hz)};
+            const bool up = commanded.to_hz > commanded.from_hz;
+            const double hz = commanded.from_hz * std::exp2(up ? octaves : -octaves);
+            now.sweep = {true, commanded.from_hz, commanded.to_hz, commanded.octaves_per_minute,
+                         up ? std::min(hz, commanded.to_hz) : std::max(hz, commanded.to_hz)};
         }
         if (!wanted.random) {
             now.random.reset();
@@ -81,8 +81,8 @@ class FakeShaker final : public drivers::Shaker {
 
     /// Since when the newest set-point is there.
     drivers::Time runs_since(drivers::Time time) {
-        if (requests.size() != told_) since_ = time;
-        told_ = requests.size();
+        if (requests.size() != seen_) since_ = time;
+        seen_ = requests.size();
         return since_;
     }
     double sweep_rate_scaled = 1, sweep_rests_s = 5;
@@ -94,11 +94,11 @@ class FakeShaker final : public drivers::Shaker {
     std::atomic<bool> stop_waits{false};
     drivers::Time hung_up_until = 0;
     bool only_read = false;
-    drivers::ShakerPsd psd_told;
+    drivers::ShakerPsd psd_answer;
     std::uint64_t psds_asked = 0;
     bool psd_asked_at_rest = true;
     bool refuse = false, writing = false;
-    std::size_t told_ = 0;
+    std::size_t seen_ = 0;
     drivers::Time since_ = 0;
     /// Of random vibration, once it runs.
     drivers::RandomReading::State levelled = drivers::RandomReading::State::at_level;

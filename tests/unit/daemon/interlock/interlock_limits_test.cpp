@@ -254,7 +254,7 @@ class InterlockLimits : public testing::TestWithParam<Case> {
   protected:
     const Case& one = GetParam();
     /// One row that tells at once, one that stops after its dwell.
-    Rig rig{{{"told", one.trip, Reaction::alarm, one.limit, 0, false},
+    Rig rig{{{"raised", one.trip, Reaction::alarm, one.limit, 0, false},
              {"stop", one.trip, Reaction::abort, one.limit, one.dwell_s, true}}};
 
     InterlockLimits() {
@@ -267,21 +267,21 @@ class InterlockLimits : public testing::TestWithParam<Case> {
     void go(bool beyond, int seconds) {
         for (int n = 0; n < 40 * seconds; ++n) one_tick(beyond);
     }
-    [[nodiscard]] bool told() const { return rig.interlock->row(0).raised; }
+    [[nodiscard]] bool raised() const { return rig.interlock->row(0).raised; }
 };
 
 TEST_P(InterlockLimits, TripsBeyondItsLimitAfterItsDwellAndLatches) {
     rig.interlock->guard(one.watched);
-    // GIVEN a condition at its limit WHEN it stays there THEN nothing is told
+    // GIVEN a condition at its limit WHEN it stays there THEN nothing is raised
     go(false, 20);
-    ASSERT_FALSE(told());
+    ASSERT_FALSE(raised());
     ASSERT_EQ(rig.interlock->tripped(), Trip::none);
     // WHEN it is beyond THEN the stop comes as soon as the dwell is over, and no sooner
     std::uint32_t since = 0;
     const std::uint32_t end = rig.count + 40 * 60;
     while (rig.interlock->tripped() == Trip::none && rig.count < end) {
         one_tick(true);
-        if (!told()) {
+        if (!raised()) {
             since = 0;
         } else if (since == 0) {
             since = rig.count;
@@ -308,13 +308,13 @@ TEST_P(InterlockLimits, TakesTimeBeyondTheLimitTogetherOnlyWhenItIsWithoutABreak
     go(false, 20);
     // WHEN it is beyond again and again for less than the dwell, THEN nothing is stopped
     for (int n = 0; n < 5; ++n) {
-        for (int wait = 0; wait < 40 * 20 && !told(); ++wait) one_tick(true);
-        ASSERT_TRUE(told()) << n;
-        for (int wait = 0; wait < 40 * 20 && told(); ++wait) {
+        for (int wait = 0; wait < 40 * 20 && !raised(); ++wait) one_tick(true);
+        ASSERT_TRUE(raised()) << n;
+        for (int wait = 0; wait < 40 * 20 && raised(); ++wait) {
             one_tick(false);
             if (rig.interlock->tripped() != Trip::none) break;
         }
-        ASSERT_FALSE(told()) << n;
+        ASSERT_FALSE(raised()) << n;
     }
     EXPECT_EQ(rig.interlock->tripped(), Trip::none);
     EXPECT_EQ(rig.shaker.stops_asked, 0U);
@@ -326,7 +326,7 @@ TEST_P(InterlockLimits, IsNotWatchedBelowItsLevel) {
     go(false, 10);
     go(true, 10);
     EXPECT_EQ(rig.interlock->tripped(), Trip::none);
-    EXPECT_FALSE(told());
+    EXPECT_FALSE(raised());
     EXPECT_EQ(rig.shaker.stops_asked, 0U);
 }
 

@@ -44,7 +44,7 @@ class Shaken {
         say(0, kLevel_g, 2);
     }
 
-    /// The table is told, and the campaign does not take the level for reached yet.
+    /// The level is commanded, and the campaign does not take the level for reached yet.
     void say(double from_g, double to_g, double ramp_s) {
         Ramp ramp;
         ramp.start_g = from_g;
@@ -74,7 +74,7 @@ class Shaken {
         ASSERT_LT(run(1), 0) << text();
     }
     [[nodiscard]] std::string text() const { return interlock_->text_of(interlock_->latched()); }
-    /// By the bands, or by a single value beyond six sigma of what was told.
+    /// By the bands, or by a single value beyond six sigma of what was commanded.
     [[nodiscard]] bool too_much() const {
         return (tripped() == Trip::amplitude_witness &&
                 text().find(" g rms at the table, 3 g commanded") != std::string::npos) ||

@@ -236,7 +236,7 @@ TEST_F(ChainTest, NamesWhatWasChangedByHand) {
         const auto said = next_start();
         EXPECT_THAT(said, HasSubstr(c.says)) << c.sql;
         EXPECT_THAT(said, HasSubstr("put aside as " + path + ".aside.")) << c.sql;
-        EXPECT_EQ(next_start(), "") << c.sql << ": it is told once, and stays latched";
+        EXPECT_EQ(next_start(), "") << c.sql << ": it is reported once, and stays latched";
         EXPECT_THAT(found(), IsEmpty()) << c.sql;
     }
 }

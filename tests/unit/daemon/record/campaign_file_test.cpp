@@ -67,7 +67,7 @@ TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
 }
 
 TEST_F(Recording, HasTheFrequencyOfASweepAndMakesItsBlocksAgain) {
-    // GIVEN a dwell under a sweep, of which the controller told the frequency five times a second
+    // GIVEN a dwell under a sweep, whose frequency the controller reported five times a second
     constexpr double kRate_hz = 400, kFrom_hz = 20, kTo_hz = 80, kSweep_s = 20;
     const Time from = 7 * drivers::kSecond;
     const auto hz_at = [&](double t) {

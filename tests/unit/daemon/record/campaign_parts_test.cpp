@@ -185,7 +185,7 @@ TEST_F(RawSegments, ThatLieThereAreLeftOutAndNotMissing) {
     fs::rename(segment(1), segment(1) + ".zst");
     fs::rename(segment(3), segment(3) + ".zst");
     fs::remove(segment(2));
-    // WHEN one is read THEN those that lie there are told apart from the one that does not
+    // WHEN one is read THEN those that lie there are distinguished from the one that does not
     EXPECT_THAT(left_out(folder_.string(), {segment(3) + ".zst"}),
                 ::testing::ElementsAre("raw-0001.log.zst"));
     EXPECT_THAT(missing(), ::testing::ElementsAre("raw-0002.log"));

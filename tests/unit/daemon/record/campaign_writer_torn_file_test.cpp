@@ -88,9 +88,9 @@ using drivers::Time;
 
 constexpr int kSamplesEach = 200;  // more than a chunk of some tables comes together
 
-/// A campaign in a folder of its own; after each commit the writes so far and the samples told of.
+/// A campaign in a folder of its own; after each commit the writes so far and the samples reported.
 std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder, int commits) {
-    std::vector<std::pair<long, std::size_t>> told;
+    std::vector<std::pair<long, std::size_t>> reported;
     Head head;
     head.name = "torn";
     head.started_by = "A. Person";
@@ -99,7 +99,7 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder,
     head.campaign = folder.filename();
     try {
         CampaignWriter writer((folder / "campaign.h5").string(), head);
-        told.emplace_back(disk.taken, 0);
+        reported.emplace_back(disk.taken, 0);
         std::size_t samples = 0;
         for (int commit = 0; commit < commits; ++commit) {
             for (int i = 0; i < kSamplesEach; ++i, ++samples) {
@@ -126,12 +126,12 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder,
                 writer.put(Gap{now, now, "samples", 0, "a test"});
             }
             writer.commit();
-            told.emplace_back(disk.taken, samples);
+            reported.emplace_back(disk.taken, samples);
         }
     } catch (const hdf5::Error&) {
         // the disk
     }
-    return told;
+    return reported;
 }
 
 class TornFile : public ::testing::TestWithParam<std::pair<End, int>> {
@@ -154,9 +154,9 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
     const fs::path whole = folder_ / "whole";
     fs::create_directory(whole);
     disk = {};
-    const auto told = write_campaign(whole, commits);
-    ASSERT_EQ(told.size(), static_cast<std::size_t>(commits) + 1);
-    const long first = told.front().first, last = disk.taken;
+    const auto reported = write_campaign(whole, commits);
+    ASSERT_EQ(reported.size(), static_cast<std::size_t>(commits) + 1);
+    const long first = reported.front().first, last = disk.taken;
     ASSERT_GT(last, first + 100);
     int torn = 0;
     for (long end = first; end <= last; ++end, ++torn) {
@@ -168,7 +168,7 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
         disk = {};
         // THEN what was committed before is there once it is mended
         std::size_t committed = 0;
-        for (const auto& [writes, samples] : told)
+        for (const auto& [writes, samples] : reported)
             if (writes <= end) committed = samples;
         try {
             static_cast<void>(recover(folder.string(), [](const std::string&) {}));

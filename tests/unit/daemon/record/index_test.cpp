@@ -19,8 +19,8 @@ namespace {
 TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
     // GIVEN one campaign that is there, and many more in the index
     write(head(1), 10 * kSecond, {1}, 1, "finished");
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    std::vector<std::string> reported;
+    const auto tell = [&reported](const std::string& words) { reported.push_back(words); };
     Index(recordings_.string(), tell).note(folder_.string());
     const std::string path = Index::path_in(recordings_.string());
     {
@@ -33,7 +33,7 @@ TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
         }
         database.execute("COMMIT");
     }
-    // THEN it is found by key and by name, and what is not is told with some that are
+    // THEN it is found by key and by name, and what is not is reported with some that are
     EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
     EXPECT_EQ(find_campaign("other-19999", {recordings_.string()}, tell),
               (recordings_ / "other-19999").string());
@@ -44,25 +44,25 @@ TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
         EXPECT_NE(std::string(error.what()).find("other-11 ..."), std::string::npos)
             << error.what();
     }
-    EXPECT_TRUE(told.empty());
+    EXPECT_TRUE(reported.empty());
     // WHEN pages that opening does not read are overwritten
     {
         std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
         file.seekp(16 * 4096);
         file << std::string(fs::file_size(path) - 16 * 4096, 'x');
     }
-    // THEN it is made anew from the files, and told
+    // THEN it is made anew from the files, and reported
     EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
-        << told[0];
+    ASSERT_EQ(reported.size(), 1U);
+    EXPECT_NE(reported[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << reported[0];
 }
 
 TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
     write(head(1), 10 * kSecond, {1}, 1, "continued");
     write(head(2), 100 * kSecond, {2}, 1);
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    std::vector<std::string> reported;
+    const auto tell = [&reported](const std::string& words) { reported.push_back(words); };
     {
         Index index(recordings_.string(), tell);
         EXPECT_TRUE(index.campaigns().empty());
@@ -86,7 +86,7 @@ TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
     EXPECT_EQ(find_campaign("test-1", {recordings_.string()}, tell), folder_.string());
     EXPECT_THROW(static_cast<void>(find_campaign("tset", {recordings_.string()}, tell)),
                  std::runtime_error);
-    EXPECT_TRUE(told.empty());
+    EXPECT_TRUE(reported.empty());
     // WHEN the last part is gone, THEN the index knows it
     fs::remove(folder_ / "campaign-2.h5");
     EXPECT_THROW(compare_with_index(folder_.string(), tell), std::runtime_error);
@@ -95,14 +95,14 @@ TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
 TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {
     write(head(1), 10 * kSecond, {1}, 1);
     std::ofstream(Index::path_in(recordings_.string())) << std::string(5000, 'x');
-    std::vector<std::string> told;
-    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    std::vector<std::string> reported;
+    const auto tell = [&reported](const std::string& words) { reported.push_back(words); };
     EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
-        << told[0];
+    ASSERT_EQ(reported.size(), 1U);
+    EXPECT_NE(reported[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << reported[0];
     EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
-    EXPECT_EQ(told.size(), 1U);
+    EXPECT_EQ(reported.size(), 1U);
 }
 
 }  // namespace

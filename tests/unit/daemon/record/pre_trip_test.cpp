@@ -21,7 +21,7 @@ struct PreTripTest : testing::Test {
                                    ("vibrig-pre-trip-" + std::to_string(::getpid()));
     std::vector<EventRecord> events;
     std::mutex mutex;
-    std::vector<std::pair<Severity, std::string>> told;
+    std::vector<std::pair<Severity, std::string>> reported;
 
     PreTripTest() { std::filesystem::remove_all(folder); }
     ~PreTripTest() override { std::filesystem::remove_all(folder); }
@@ -30,7 +30,7 @@ struct PreTripTest : testing::Test {
         return {where.string(), 25 * kMillisecond, [this] { return events; },
                 [this](Severity severity, const std::string& text) {
                     const std::lock_guard lock(mutex);
-                    told.emplace_back(severity, text);
+                    reported.emplace_back(severity, text);
                 }};
     }
     static drivers::Sample sample(std::uint32_t n) {
@@ -85,8 +85,8 @@ TEST_F(PreTripTest, SavesTheLastMinuteOfSamplesAndEvents) {
     EXPECT_TRUE(last["force_g"][2].is_null());
     EXPECT_EQ(last["quality"]["azimuth"], "stale");
     EXPECT_EQ(last["quality"]["outer"], "good");
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_EQ(told[0].first, Severity::info);
+    ASSERT_EQ(reported.size(), 1U);
+    EXPECT_EQ(reported[0].first, Severity::info);
 }
 
 TEST_F(PreTripTest, ARateThatNobodyHasStatedIsRefused) {
@@ -100,9 +100,9 @@ TEST_F(PreTripTest, SaysSoWhenItCannotBeSavedAndLeavesNothingHalf) {
     pre_trip.start();
     pre_trip.tripped({"tilt", "tilt", "tilted", 0, 0});
     pre_trip.stop();
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_EQ(told[0].first, Severity::alarm);
-    EXPECT_THAT(told[0].second, testing::HasSubstr("cannot save what was before the trip"));
+    ASSERT_EQ(reported.size(), 1U);
+    EXPECT_EQ(reported[0].first, Severity::alarm);
+    EXPECT_THAT(reported[0].second, testing::HasSubstr("cannot save what was before the trip"));
 }
 
 }  // namespace

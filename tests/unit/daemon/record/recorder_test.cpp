@@ -16,11 +16,11 @@ namespace {
 TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
     rt::RealClock clock;
     const auto waiter = clock.make_waiter();
-    std::vector<std::string> told;
+    std::vector<std::string> reported;
     configuration::RecordSettings settings;
     settings.keep_free_mb = 0;
     Recorder recorder(settings, folder_.string(), clock, *waiter,
-                      [&told](Severity, const std::string& text) { told.push_back(text); });
+                      [&reported](Severity, const std::string& text) { reported.push_back(text); });
     // GIVEN more samples than the ring holds before the recorder comes to look
     const auto made = samples(20'000, drivers::kSecond);
     recorder.campaign_begun(head());
@@ -49,7 +49,7 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
     for (const auto& gap : read.gaps) lost += gap.lost;
     EXPECT_EQ(lost, counts.dropped);
     EXPECT_EQ(recorder.status().samples_lost, counts.dropped);
-    ASSERT_FALSE(told.empty());
+    ASSERT_FALSE(reported.empty());
 }
 
 }  // namespace

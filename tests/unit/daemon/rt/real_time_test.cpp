@@ -126,8 +126,8 @@ TEST(RealTime, LocksNothingWhereTheLimitWouldBeMetNowOrLater) {
             const auto lock = lock_memory();
             void* const room = ::mmap(nullptr, std::size_t{2} << 30, PROT_NONE,
                                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-            const std::string told = "; the limit is " + std::to_string(limit.rlim_cur);
-            return right && !lock.locked && lock.cause.find(told) != std::string::npos &&
+            const std::string stated = "; the limit is " + std::to_string(limit.rlim_cur);
+            return right && !lock.locked && lock.cause.find(stated) != std::string::npos &&
                    locked_kb() == 0 && room != MAP_FAILED;
         })) << bytes;
     }

@@ -51,7 +51,7 @@ TEST_F(RandomDwellTest, IsArmedForTheLoudestOfEachProfileAndItsThreeSigma) {
                                          "rms, 3 sigma 6 g)"));
     EXPECT_THAT(said, testing::HasSubstr("profile 'narrow' (number 7, checksum 89abcdef, up to 3 g "
                                          "rms, 3 sigma 9 g)"));
-    // AND the interlock is told the same
+    // AND the interlock has the same
     static_cast<void>(command(Kind::start));
     while (ramps.empty() && drivers::to_seconds(now) < 100) run_rig();
     ASSERT_FALSE(ramps.empty());
@@ -72,14 +72,14 @@ TEST_F(RandomDwellTest, TakesTheTransmissionThatTheLoopCheckMeasured) {
     proof.transmissions = {{25.1, 0.3 * 1.04}};
     campaign->take_over_proofs({proof});
     static_cast<void>(begin());
-    shaker.psd_told = {1, {{20, 0.01}, {120, 0.01}}, ""};
+    shaker.psd_answer = {1, {{20, 0.01}, {120, 0.01}}, ""};
     played.summary.samples = 400;
     ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
     // Below 15 Hz as at 15, above 25.1 as there; half the power each.
     const double ratio = (1.02 * 1.02 + 1.04 * 1.04) / 2;
     EXPECT_NEAR(orders[1].dwell.random.mean_square_g2, ratio, 1e-12);
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_NEAR(told[0].power_ratio, ratio, 1e-12);
+    ASSERT_EQ(reported_psds.size(), 1U);
+    EXPECT_NEAR(reported_psds[0].power_ratio, ratio, 1e-12);
 }
 
 /// What the accelerometers do not show at the reference frequency does not lack at the platform.

@@ -33,7 +33,7 @@ struct ZeroRunTest : CampaignTest {
         rig_port.feed = &feed;
         accelerometers.also = [this](const drivers::Sample& sample) { feed.take(sample); };
         shaker_obeys = false;
-        wall_clock = [this] { return now; };
+        steady_clock = [this] { return now; };
         make();
         for (int i = 0; i < 20; ++i) live();
     }
@@ -173,13 +173,13 @@ TEST_F(ZeroRunTest, AWatchdogThatFiresAlthoughItIsFedEndsIt) {
                 AllOf(HasSubstr("shaker fault"), HasSubstr("while its watchdog was fed")));
 }
 
-TEST_F(ZeroRunTest, ATableThatMovesAlthoughItIsToldNothingEndsIt) {
+TEST_F(ZeroRunTest, ATableThatMovesAlthoughNothingIsCommandedEndsIt) {
     accelerometers.table_g = 0;
     accelerometers.platform_g = 0;
     order("at_zero");
     while (shaker.requests.empty()) live();
     accelerometers.table_g = 0.015;
-    EXPECT_THAT(over().message, HasSubstr("the table moves although it is told 0 g"));
+    EXPECT_THAT(over().message, HasSubstr("the table moves although 0 g is commanded"));
 }
 
 TEST_F(ZeroRunTest, APlatformThatFeelsItEndsIt) {
@@ -190,7 +190,7 @@ TEST_F(ZeroRunTest, APlatformThatFeelsItEndsIt) {
     EXPECT_THAT(over().message, HasSubstr("the platform feels"));
 }
 
-TEST_F(ZeroRunTest, AControllerThatIsNotIdleAfterItRanIsTold) {
+TEST_F(ZeroRunTest, AControllerThatIsNotIdleAfterItRanIsReported) {
     order("at_zero");
     while (shaker.requests.empty()) live();
     idle_state = 3;  // stopping, for ever
