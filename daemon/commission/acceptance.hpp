@@ -43,7 +43,7 @@ struct SignStatement {
     /// that stops it.
     int says = 0;
 };
-/// Of {"by", "says", "source"} each; what is none of it is left at nothing.
+/// Statements from {"by", "says", "source"} each; what is none of it is left at nothing.
 [[nodiscard]] std::vector<SignStatement> sign_statements(const Json& json);
 
 /// Why platform.drift_sign is not what these two say, who have answered apart; empty: it is.

@@ -49,15 +49,15 @@ bool only_moved(const std::string& before, const std::string& after) {
     return true;
 }
 
-/// "platform.up is "+z", was proven as "+y""; empty: they are the same. `told`: it may differ.
-std::string change(const Keys& proven, const Keys& now, std::string& told) {
+/// "platform.up is "+z", was proven as "+y""; empty: they are the same. `moved`: it may differ.
+std::string change(const Keys& proven, const Keys& now, std::string& moved) {
     for (const auto& [key, value] : now) {
         const auto it = proven.find(key);
         if (it == proven.end()) return fmt::format("{} is {}, was not known then", key, value);
         if (it->second == value) continue;
         const auto words = fmt::format("{} is {}, was proven as {}", key, value, it->second);
         if (key != kZero || !only_moved(it->second, value)) return words;
-        told = words;
+        moved = words;
     }
     for (const auto& [key, value] : proven)
         if (!now.contains(key)) return fmt::format("{} is gone, was proven as {}", key, value);
@@ -173,7 +173,7 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             const double valid = loaded_.configuration.commission.valid_days;
             Keys proven = r.keys;
             if (device_.empty()) proven.erase(kDevice);
-            s.why = change(proven, keys_.at(part), s.told);
+            s.why = change(proven, keys_.at(part), s.moved);
             if (!s.why.empty())
                 s.why += fmt::format(" by {} on {}", joined(r.by), date_of(r.utc_ns));
             else if (r.meaning != kMeaning)
@@ -300,7 +300,7 @@ std::string Book::not_proven_below_shaker(std::int64_t utc_ns) const {
 Json Book::status(std::int64_t utc_ns) const {
     Json parts = Json::object();
     for (const auto& s : standing(utc_ns)) {
-        Json one{{"proven", s.proven}, {"why", s.why}, {"told", s.told}};
+        Json one{{"proven", s.proven}, {"why", s.why}, {"told", s.moved}};
         if (s.record) {
             one["by"] = s.record->by;
             one["utc"] = instant_of(s.record->utc_ns);

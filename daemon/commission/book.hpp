@@ -16,7 +16,7 @@ struct Standing {
     Part part = Part::bus;
     bool proven = false;
     std::string why;          ///< not proven
-    std::string told;         ///< proven, but a zero has moved since
+    std::string moved;        ///< proven, but a zero has moved since
     std::string signed_by{};  ///< a person's certificate
     std::optional<PartRecord> record;
 };
@@ -34,14 +34,14 @@ class Book {
     /// A part below the shaker's that does not stand: without it nothing of the shaker is
     /// witnessed. Empty: all of them stand.
     [[nodiscard]] std::string not_proven_below_shaker(std::int64_t utc_ns) const;
-    /// Who the shaker's controller says it is, which its parts stand on. Until it is known they are
-    /// not held against it.
+    /// The identity that the shaker's controller reports, which its parts stand on. Until it is
+    /// known they are not held against it.
     void shaker_is(const std::string& device);
     /// What the file says that is not a record; empty: nothing.
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
     /// What the daemon runs with, as it was when it started.
     [[nodiscard]] const Keys& keys(Part part) const { return keys_.at(part); }
-    /// Of a part as it was proven; empty: it was not.
+    /// Evidence of a part as it was proven; empty: it was not.
     [[nodiscard]] Json evidence(Part part) const;
     /// Takes a part in and writes the file. Throws std::runtime_error that names the file.
     void prove(const std::vector<Part>& parts, const PartRecord& what,

@@ -49,10 +49,10 @@ class BitBook {
   public:
     using Json = nlohmann::ordered_json;
 
-    /// Of a DBC by the SHA-256 of its file: bits of another one do not count.
+    /// The book of a DBC, by the SHA-256 of its file: bits of another one do not count.
     BitBook(const std::string& folder, std::string dbc_sha256);
-    /// Of the configuration's DBC. Throws std::runtime_error that names the file: it cannot be
-    /// read.
+    /// The book of the configuration's DBC. Throws std::runtime_error that names the file: it
+    /// cannot be read.
     explicit BitBook(const configuration::Configuration& c);
     /// In place of what was said of these bits. Throws std::runtime_error that names the file.
     void keep(const std::vector<BitProof>& bits, std::int64_t utc_ns);

@@ -31,7 +31,7 @@ class BusList {
         std::vector<int> at_rest;               ///< bytes that change then
         std::vector<int> turned_only;           ///< that change while it is turned, and not at rest
         std::vector<int> counters;              ///< that grow by one with each frame, at rest
-        /// Of each byte that changes: in which share of frames, at rest and while it is turned. Of
+        /// For each byte that changes: in which share of frames, at rest and while it is turned. Of
         /// an angle the highest byte flips least.
         struct Flips {
             int byte = 0;

@@ -14,7 +14,7 @@
 namespace vibrig::commission {
 
 /// Which signal of a DBC follows while a person turns one gimbal: range while turned over noise at
-/// rest. Accelerometers answer, too; they are told by three whose norm stays. One thread.
+/// rest. Accelerometers answer, too; they are recognised as three whose norm stays. One thread.
 class BusSignals {
   public:
     explicit BusSignals(proto::Dbc dbc);
@@ -33,7 +33,7 @@ class BusSignals {
         bool changed = false;      ///< ever
         [[nodiscard]] double score() const { return turned_range / noise; }
     };
-    /// Of messages that were heard.
+    /// Signals of the messages that were heard.
     [[nodiscard]] std::vector<Signal> signals() const;
     /// Messages of the DBC that were not heard; "1a0" that are not in it.
     [[nodiscard]] std::vector<std::string> missing() const;

@@ -56,11 +56,11 @@ struct Finding {
 /// The keys of a decided finding as a configuration file has them, each with its evidence.
 [[nodiscard]] std::string to_toml(const Finding& finding, bool simulated);
 
-/// Of the classes that gravity leaves, best first, five at most.
+/// Hypotheses of the classes that gravity leaves, best first, five at most.
 [[nodiscard]] Json hypotheses_of(const estimator::commissioning::GravityFinding& gravity);
 
-/// Of the bus, whatever was found of it: DBC, names of angles and accelerometers, samples/s as they
-/// are measured.
+/// Keys of the bus, whatever was found of it: DBC, names of angles and accelerometers, samples/s as
+/// they are measured.
 void fill_bus_keys(Finding& finding, const Names& names, double measured_hz);
 
 /// What is known of the commands: reading per commanded deg by channel, 0: not known, and the

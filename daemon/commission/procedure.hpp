@@ -214,7 +214,7 @@ class Procedure {
     Json log_ = Json::array(), script_;
     Json left_ = Json::object();  ///< answers that stand, behind one that is asked again
     std::string again_;
-    bool replaying_ = false;  ///< nothing is commanded, nobody is told
+    bool replaying_ = false;  ///< nothing is commanded, nothing is printed
     bool unkept_ = false;     ///< the mean being taken is one of a kept position
     struct Held {
         Vec3 travel{};

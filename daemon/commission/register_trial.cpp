@@ -138,7 +138,7 @@ std::string RegisterTrial::role_at(std::uint16_t address) const {
 }
 
 void RegisterTrial::row(std::string name, bool passed, std::string found) {
-    person_.told("  " + name + ": " + found);
+    person_.show("  " + name + ": " + found);
     rows_.push_back({std::move(name), std::move(found), passed});
 }
 
@@ -153,7 +153,7 @@ void RegisterTrial::chain_is(bool open, const std::string& asked) {
     for (int n = 0; n < kAsked; ++n) {
         static_cast<void>(person_.answer(asked));
         if ((value_of(read_watched(), map_.emergency_stop) != 0) == open) return;
-        person_.told(fmt::format("  shaker.registers.emergency_stop ({}) reads {}, expected {}",
+        person_.show(fmt::format("  shaker.registers.emergency_stop ({}) reads {}, expected {}",
                                  place_of(map_.emergency_stop), open ? "closed" : "open",
                                  open ? "open" : "closed"));
     }

@@ -32,7 +32,7 @@ class TrialPerson {
     virtual ~TrialPerson() = default;
     /// What is typed, without blanks around it. Throws std::runtime_error where nobody answers.
     virtual std::string answer(const std::string& question) = 0;
-    virtual void told(const std::string& line) = 0;
+    virtual void show(const std::string& line) = 0;
 };
 
 /// One thing that was tried, and what came of it.
@@ -50,8 +50,8 @@ class TrialEnded : public std::runtime_error {
 
 /// Whether a controller does what [shaker.registers] says of it, before anything may move: with the
 /// power stage off, its stop chain by hand, then each register written with the chain open. Nothing
-/// is written unless the controller says that it rests with the chain open, nor to a register whose
-/// name nobody has typed, nor where another master writes.
+/// is written unless the controller reports that it rests with the chain open, nor to a register
+/// whose name nobody has typed, nor where another master writes.
 class RegisterTrial {
   public:
     RegisterTrial(const proto::ShakerRegisters& map, TrialPort& port, TrialPerson& person);
@@ -63,7 +63,7 @@ class RegisterTrial {
     /// neighbours as they were; run = 1 does not lead to running. Those left out are rows that have
     /// not passed.
     void write_each();
-    /// The amplitude's set-point, one count above each of these (name, g): refused, or told. Only
+    /// The amplitude's set-point, one count above each of these (name, g): refused, or noted. Only
     /// where somebody has named the amplitude.
     void beyond_limits(const std::vector<std::pair<std::string, double>>& limits_g);
 

@@ -90,7 +90,7 @@ void RegisterTrial::hold_against(const Role& role, const Words& words, const cha
         const auto other = role_at(at.second);
         // A place that shows the set-point once more.
         if (other.empty() && std::ranges::find(words, word) != words.end()) {
-            person_.told(fmt::format("  holding {} follows it", at.second));
+            person_.show(fmt::format("  holding {} follows it", at.second));
             continue;
         }
         throw TrialEnded(fmt::format(
@@ -110,7 +110,7 @@ void RegisterTrial::display_agrees(const Role& role, double value) {
         if (text == "-") return;
         const auto shown = shown_number(text);
         if (!shown) {
-            person_.told("  found \"" + text + "\", expected a number such as 16.00, or -");
+            person_.show("  found \"" + text + "\", expected a number such as 16.00, or -");
             continue;
         }
         // Beyond what a float keeps of it.
@@ -138,11 +138,11 @@ void RegisterTrial::take_back() noexcept {
             if (!done || is != words) throw TrialEnded("it is not taken back");
         } catch (const std::exception& error) {
             try {
-                person_.told(fmt::format(
+                person_.show(fmt::format(
                     "  shaker.registers.{} ({}) was {:g} before: set it by "
                     "hand ({})",
                     role.name, place_of(*role.reg), proto::decode(*role.reg, words), error.what()));
-            } catch (const std::exception&) {  // nobody is there to be told
+            } catch (const std::exception&) {  // nobody is there to read it
             }
         }
     }
@@ -156,7 +156,7 @@ bool RegisterTrial::named(const Role& role) {
                         role.name, place_of(*role.reg), value_of(last_, *role.reg), role.name));
         if (text.empty()) return false;
         if (text == role.name) return true;
-        person_.told("  found \"" + text + "\", expected " + role.name + " or nothing");
+        person_.show("  found \"" + text + "\", expected " + role.name + " or nothing");
     }
 }
 

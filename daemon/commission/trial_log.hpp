@@ -52,7 +52,7 @@ class TriedRegisters {
     /// Why these were not tried; empty: they were.
     [[nodiscard]] std::string lacks(const Keys& keys) const;
 
-    /// Of an effective configuration.
+    /// Keys of an effective configuration.
     [[nodiscard]] static Keys keys_of(const configuration::Loaded& loaded);
 
   private:

@@ -156,7 +156,7 @@ class Dialogue {
         }
     }
 
-    /// A line; meanwhile the daemon is told that somebody is there.
+    /// A line; meanwhile the daemon hears that somebody is there.
     std::string typed() {
         out_ << "> " << std::flush;
         for (;;) {
@@ -278,7 +278,7 @@ int show_commission(const CommissionOptions& options) {
             if (part.contains("age")) text += ", " + age_text(part["age"]);
             if (const std::string person = part["signed_by"]; !person.empty())
                 text += ", signed with the certificate of " + person;
-            if (const std::string told = part["told"]; !told.empty()) text += "; " + told;
+            if (const std::string moved = part["told"]; !moved.empty()) text += "; " + moved;
         } else {
             text += "NOT: " + part["why"].get<std::string>();
         }

@@ -49,7 +49,7 @@ drivers::ShakerSettings settings_of(const RegisterOptions& options) {
         settings.port = std::stoi(options.tcp.substr(colon + 1), &used);
         if (used + colon + 1 == options.tcp.size() && settings.port > 0 && settings.port < 65536)
             return settings;
-    } catch (const std::exception&) {  // told below
+    } catch (const std::exception&) {  // reported below
     }
     throw std::runtime_error("--tcp: found \"" + options.tcp + "\", expected HOST or HOST:PORT");
 }

@@ -25,19 +25,19 @@ namespace {
 
 constexpr auto kBetweenTrials = std::chrono::milliseconds(50);
 
-volatile std::sig_atomic_t told_to_end = 0;  // NOLINT: a signal handler's
+volatile std::sig_atomic_t end_ordered = 0;  // NOLINT: a signal handler's
 
 /// Throws once: what is to be taken back then still has its way.
 void look_for_end() {
     static bool seen = false;
-    if (told_to_end == 0 || std::exchange(seen, true)) return;
+    if (end_ordered == 0 || std::exchange(seen, true)) return;
     throw std::runtime_error("ended by a signal");
 }
 
 /// An end from outside is an answer like any other: what was written is taken back first.
 void end_in_order() {
     struct sigaction action {};
-    action.sa_handler = [](int) { told_to_end = 1; };  // without SA_RESTART: reading a line ends
+    action.sa_handler = [](int) { end_ordered = 1; };  // without SA_RESTART: reading a line ends
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(signal, &action, nullptr);
 }
 
@@ -104,7 +104,7 @@ class Typist : public commission::TrialPerson {
             throw;
         }
     }
-    void told(const std::string& line) override { print_wrapped(out_, line); }
+    void show(const std::string& line) override { print_wrapped(out_, line); }
 
   private:
     std::ostream& out_;
@@ -125,7 +125,7 @@ void power_is_off(Typist& person) {
         if (text == "yes" || text == "y") return;
         if (text == "no" || text == "n")
             throw commission::TrialEnded("registers are tried with the power stage off");
-        person.told("  found \"" + text + "\", expected yes or no");
+        person.show("  found \"" + text + "\", expected yes or no");
     }
 }
 

@@ -174,12 +174,12 @@ TEST_F(Books, AProofIsMadeWithoutThePartsThatItProves) {
                                               "excitation: vibrig commission watchdog stop"));
 }
 
-TEST_F(Books, AZeroThatWasFoundAnewIsToldOnly) {
+TEST_F(Books, AZeroThatWasFoundAnewIsReportedOnly) {
     const auto proven = loaded();
     prove_all(proven);
     const auto moved = loaded("[accelerometer]\nzero_g = [0.004, -0.009, 0.0]\n");
     EXPECT_EQ(Book(moved).refusal(kNow), "");
-    EXPECT_THAT(Book(moved).standing(kNow)[2].told, HasSubstr("accelerometer.zero_g is"));
+    EXPECT_THAT(Book(moved).standing(kNow)[2].moved, HasSubstr("accelerometer.zero_g is"));
     const auto far = loaded("[accelerometer]\nzero_g = [0.014, 0.0, 0.0]\n");
     EXPECT_THAT(Book(far).refusal(kNow), HasSubstr("accelerometer.zero_g"));
 }

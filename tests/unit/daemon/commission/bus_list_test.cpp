@@ -51,7 +51,7 @@ TEST(BusList, SaysHowOftenAMessageComesAndWhichOfItsBytesChange) {
     EXPECT_EQ(json_of(bus)["messages"][0]["turned"], (std::vector<int>{3}));
 }
 
-TEST(BusList, AMessageWhoseLengthChangesIsToldByBoth) {
+TEST(BusList, AMessageWhoseLengthChangesIsReportedByBoth) {
     BusList bus;
     for (int n = 0; n < 20; ++n)
         bus.add(5, false,

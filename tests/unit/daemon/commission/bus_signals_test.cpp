@@ -53,7 +53,7 @@ struct Bus {
     }
 };
 
-TEST(BusSignals, TheAngleThatIsTurnedFollowsAndAccelerometersAreToldByTheirNorm) {
+TEST(BusSignals, TheAngleThatIsTurnedFollowsAndAccelerometersAreRecognisedByTheirNorm) {
     Bus bus;
     bus.run([&bus](int n, double by) { bus.frame(n, 12 + by, 3, 359.9); });
     EXPECT_EQ(bus.signals.winner(), "Resolvers.Outer");

@@ -196,7 +196,7 @@ TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
     EXPECT_EQ(result["outcome"], "decided") << result.dump(1);
 }
 
-TEST_F(Commissioned, ASoftStopIsToldWithItsGimbalAndATravelWithinItIsScaledInto) {
+TEST_F(Commissioned, ASoftStopIsReportedWithItsGimbalAndATravelWithinItIsScaledInto) {
     int ended = 0;
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));

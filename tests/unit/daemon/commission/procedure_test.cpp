@@ -144,7 +144,7 @@ TEST_F(Commissioned, ByHandNothingIsCommanded) {
     EXPECT_EQ(released, 0);
 }
 
-TEST_F(Commissioned, AChannelThatDoesNotChangeIsToldAtTheFirstLook) {
+TEST_F(Commissioned, AChannelThatDoesNotChangeIsReportedAtTheFirstLook) {
     for (const int one : {-1, 2}) {
         rig_of(4);
         based = false;
@@ -256,7 +256,7 @@ TEST_F(Commissioned, AWordAgainstAMeasurementStopsItAndBothAreShown) {
     EXPECT_TRUE(result["found"].empty());
 }
 
-TEST_F(Commissioned, AnswersThatAreNoneAreToldWhatWasExpected) {
+TEST_F(Commissioned, AnswersThatAreNoneGetWhatWasExpected) {
     rig_of(1);
     static_cast<void>(run(false, "travel"));
     EXPECT_THAT(procedure->answer("Ada", "travel", "1 2 3"),

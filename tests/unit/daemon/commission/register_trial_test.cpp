@@ -108,7 +108,7 @@ class Fake : public TrialPort {
     [[nodiscard]] double now_s() const override { return time_s; }
 };
 
-/// Does as asked, unless told otherwise for a question that begins so.
+/// Does as asked, unless set otherwise for a question that begins so.
 class Person : public TrialPerson {
   public:
     Fake& controller;
@@ -142,7 +142,7 @@ class Person : public TrialPerson {
         }
         return "";
     }
-    void told(const std::string& line) override { lines.push_back(line); }
+    void show(const std::string& line) override { lines.push_back(line); }
 };
 
 struct Bench {
@@ -273,7 +273,7 @@ TEST(RegisterTrial, AnotherMasterIsNamedByTheRegisterThatChanges) {
     EXPECT_THAT(later.controller.written, Not(Contains(120)));
 }
 
-TEST(RegisterTrial, ARegisterThatIsAnothersIsToldByItsNeighbours) {
+TEST(RegisterTrial, ARegisterThatIsAnothersIsRecognisedByItsNeighbours) {
     Bench b;
     b.controller.after_write = [&c = b.controller](std::uint16_t at) {
         if (at == 100 && c.value(c.map.frequency) != 15) c.holding[105] = 99;
@@ -282,7 +282,7 @@ TEST(RegisterTrial, ARegisterThatIsAnothersIsToldByItsNeighbours) {
                 HasSubstr("writing shaker.registers.frequency (holding 100) changes holding 105 "
                           "from 7 to 99"));
     EXPECT_EQ(b.controller.value(b.controller.map.frequency), 15) << "and is taken back";
-    // BUT a place that shows the set-point once more is told only
+    // BUT a place that shows the set-point once more is noted only
     Bench twice;
     twice.controller.after_write = [&c = twice.controller](std::uint16_t at) {
         if (at == 120) c.holding[122] = c.holding[120];
