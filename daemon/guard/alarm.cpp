@@ -30,7 +30,7 @@ using drivers::Time;
 constexpr Time kBeat = kSecond / 2;
 constexpr Time kRetryHorn = kSecond;
 // Between write and read-back another master may have had its turn.
-constexpr int kLooksToBelieve = 2;
+constexpr int kReadsToBelieve = 2;
 constexpr auto kLookAtPager = std::chrono::milliseconds(50);
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::size_t kLongestText = 600;
@@ -115,7 +115,7 @@ bool Coils::set(Coil& coil, bool on) {
     coil.on = on;
     if (now || !on) return true;
     note_ = line_.name() + ": the " + coil.name + " (coil " + std::to_string(coil.address) +
-            ") was told on and reads back off";
+            ") was switched on and reads back off";
     return false;
 }
 
@@ -243,8 +243,8 @@ bool Alarm::confirms() const {
 }
 
 void Alarm::sound(Time now) {
-    bad_looks_ = coils_->show(shown_, now) ? 0 : std::min(bad_looks_ + 1, kLooksToBelieve);
-    const bool confirms = bad_looks_ < kLooksToBelieve;
+    bad_reads_ = coils_->show(shown_, now) ? 0 : std::min(bad_reads_ + 1, kReadsToBelieve);
+    const bool confirms = bad_reads_ < kReadsToBelieve;
     bool changed = false;
     {
         const std::lock_guard lock(mutex_);

@@ -47,7 +47,7 @@ class Coils {
     struct Coil {
         const char* name;
         int address;
-        bool on = false;  ///< as last told
+        bool on = false;  ///< as last commanded
     };
     [[nodiscard]] bool set(Coil& coil, bool on);
     [[nodiscard]] bool is_on(const Coil& coil, bool& on);
@@ -96,7 +96,7 @@ class Alarm {
     /// The pager is run with this at once, unless it still runs for another of that kind. Of what
     /// waits, 16 are kept.
     void page(Tune kind, const std::string& text);
-    /// Horn and lamp read back as told, or there are none.
+    /// Horn and lamp read back as commanded, or there are none.
     [[nodiscard]] bool confirms() const;
 
   private:
@@ -110,7 +110,7 @@ class Alarm {
     // One that hangs with a stop does not hold up that the stop is not obeyed.
     std::unique_ptr<Pager> stop_pager_, disobeyed_pager_;
     Tune shown_ = Tune::none;
-    int bad_looks_ = 0;
+    int bad_reads_ = 0;
 
     mutable std::mutex mutex_;  ///< guards what follows; never held while the outside is busy
     std::condition_variable changed_;

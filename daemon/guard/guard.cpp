@@ -78,43 +78,43 @@ void Guard::acknowledge() {
 }
 
 void Guard::tell_findings() {
-    if (judge_.cause() != proto::GuardCause::none && judge_.finding() != told_finding_) {
-        told_finding_ = judge_.finding();
-        told_disobeyed_ = told_over_ = false;
+    if (judge_.cause() != proto::GuardCause::none && judge_.finding() != reported_finding_) {
+        reported_finding_ = judge_.finding();
+        reported_disobeyed_ = reported_over_ = false;
         const std::string text = std::string(proto::name_of(judge_.cause())) + ": " +
                                  proto::text_of(judge_.cause()) + "; " + words();
         say("alarm", text);
         if (judge_.cause() != proto::GuardCause::stop_disobeyed) alarm_.page(Tune::stop, text);
     }
-    if (judge_.disobeyed() && !std::exchange(told_disobeyed_, true)) {
+    if (judge_.disobeyed() && !std::exchange(reported_disobeyed_, true)) {
         const std::string text = proto::text_of(proto::GuardCause::stop_disobeyed);
         say("alarm", text);
         alarm_.page(Tune::disobeyed, text);
     }
-    if (judge_.cause() == proto::GuardCause::none && !std::exchange(told_over_, true))
+    if (judge_.cause() == proto::GuardCause::none && !std::exchange(reported_over_, true))
         say("info", "acknowledged, watching");
 }
 
 void Guard::tell_links(drivers::Time now) {
     const bool silent = !meeting_.word() ||
                         drivers::to_seconds(now - meeting_.heard()) > safety::kHeartbeatDeadline_s;
-    if (std::exchange(told_silent_, silent) != silent)
+    if (std::exchange(reported_silent_, silent) != silent)
         say(silent ? "warning" : "info", silent ? "vibrigd is silent" : "vibrigd is heard");
-    if (std::exchange(told_blind_, !sight_.known()) != !sight_.known())
+    if (std::exchange(reported_blind_, !sight_.known()) != !sight_.known())
         say(sight_.known() ? "info" : "warning",
             sight_.known() ? "an accelerometer is seen" : "no accelerometer is seen");
-    const auto tell_stuck = [](bool& told, bool stuck, const std::string& where) {
-        if (std::exchange(told, stuck) == stuck) return;
+    const auto tell_stuck = [](bool& reported, bool stuck, const std::string& where) {
+        if (std::exchange(reported, stuck) == stuck) return;
         say(stuck ? "warning" : "info",
             "accelerometer of the " + where +
                 (stuck ? " is stuck: it does not move although the table shakes, and its "
                          "stillness is not taken for rest"
                        : " moves again"));
     };
-    tell_stuck(told_table_stuck_, sight_.table_stuck, "table");
-    tell_stuck(told_platform_stuck_, sight_.platform_stuck, "platform");
+    tell_stuck(reported_table_stuck_, sight_.table_stuck, "table");
+    tell_stuck(reported_platform_stuck_, sight_.platform_stuck, "platform");
     const bool unreached = !shaker_.word(now).known;
-    if (std::exchange(told_shaker_, unreached) != unreached)
+    if (std::exchange(reported_shaker_, unreached) != unreached)
         say(unreached ? "warning" : "info",
             unreached ? "the shaker is not reached: " + shaker_.note() : "the shaker is reached");
 }

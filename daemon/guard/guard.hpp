@@ -46,10 +46,10 @@ class Guard {
     Alarm alarm_;
     Sight sight_;
 
-    std::uint64_t told_finding_ = 0;
-    bool told_disobeyed_ = false, told_over_ = true;
-    bool told_table_stuck_ = false, told_platform_stuck_ = false;
-    bool told_silent_ = true, told_blind_ = true, told_shaker_ = true;
+    std::uint64_t reported_finding_ = 0;
+    bool reported_disobeyed_ = false, reported_over_ = true;
+    bool reported_table_stuck_ = false, reported_platform_stuck_ = false;
+    bool reported_silent_ = true, reported_blind_ = true, reported_shaker_ = true;
 };
 
 }  // namespace vibrig::guard

@@ -11,7 +11,7 @@
 
 namespace vibrig::guard {
 
-/// What the shaker's controller says over the guard's own connection.
+/// What the shaker's controller reports over the guard's own connection.
 struct ShakerWord {
     bool known = false;  ///< read lately
     bool runs = false;

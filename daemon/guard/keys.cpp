@@ -57,7 +57,7 @@ Keys::Keys(const std::string& text, std::string file) : file_(std::move(file)) {
 void Keys::wrong(const std::string& key, const toml::node* node, const std::string& found,
                  const std::string& expected) {
     problems_ += (node != nullptr ? placed(node->source()) : file_) + ": " +
-                 told(key, found, expected) + "\n";
+                 key_error(key, found, expected) + "\n";
 }
 
 std::string Keys::placed(const toml::source_region& source) const {
@@ -98,11 +98,11 @@ void Keys::look_for_unknown(const toml::table& table, const std::string& prefix)
             const bool bare = std::all_of(word.begin(), word.end(), [](unsigned char letter) {
                 return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
             });
-            problems_ +=
-                placed(name.source()) + ": " +
-                told(prefix + (bare ? word : in_quotes(word)),
-                     node.is_table() ? "an unknown table" : "an unknown key", names_in(prefix)) +
-                "\n";
+            problems_ += placed(name.source()) + ": " +
+                         key_error(prefix + (bare ? word : in_quotes(word)),
+                                   node.is_table() ? "an unknown table" : "an unknown key",
+                                   names_in(prefix)) +
+                         "\n";
         }
     }
 }

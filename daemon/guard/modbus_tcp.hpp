@@ -26,7 +26,7 @@ class ModbusTcp {
     void close() noexcept;
     /// Closes, since a late answer could be taken for the next one's. False.
     bool lose(const std::string& what);
-    /// Of one request, from now on.
+    /// Limit of one request, from now on.
     void wait_for_ms(int time) noexcept;
     void wait_as_ever() noexcept { wait_for_ms(wait_ms_); }
 

@@ -6,7 +6,7 @@
 
 namespace vibrig::guard {
 
-/// What one accelerometer, or a triad of them, says of motion within the last window.
+/// What one accelerometer, or a triad of them, shows of motion within the last window.
 struct Motion {
     bool known = false;  ///< enough samples, none of them old
     /// rms of the norm of the specific force less its mean, g: a slow tilt is no vibration.

@@ -163,7 +163,8 @@ void read_alarm(Keys& keys, AlarmSettings& a) {
 
 }  // namespace
 
-std::string told(const std::string& key, const std::string& found, const std::string& expected) {
+std::string key_error(const std::string& key, const std::string& found,
+                      const std::string& expected) {
     return key + ": found " + found + ", expected " + expected;
 }
 

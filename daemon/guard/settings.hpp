@@ -19,8 +19,8 @@ class SettingsError : public std::runtime_error {
 };
 
 /// "key: found X, expected Y"
-[[nodiscard]] std::string told(const std::string& key, const std::string& found,
-                               const std::string& expected);
+[[nodiscard]] std::string key_error(const std::string& key, const std::string& found,
+                                    const std::string& expected);
 
 /// Where the accelerometers are on the bus, as "Message.Signal"; empty: there is none.
 struct WitnessSettings {

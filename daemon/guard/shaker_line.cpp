@@ -25,9 +25,9 @@ ShakerLine::ShakerLine(const ShakerLineSettings& settings)
     : settings_(settings), line_(settings.host, settings.port, settings.unit) {
     if (!line_.resolve())
         throw std::runtime_error((settings.host_place.empty() ? "" : settings.host_place + ": ") +
-                                 told("shaker.host",
-                                      '"' + settings.host + "\" (" + line_.note() + ")",
-                                      "a host that can be resolved"));
+                                 key_error("shaker.host",
+                                           '"' + settings.host + "\" (" + line_.note() + ")",
+                                           "a host that can be resolved"));
 }
 
 bool ShakerLine::read(const proto::Register& reg, double& value) {

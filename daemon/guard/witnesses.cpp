@@ -11,7 +11,7 @@ namespace {
 double window_of(const WitnessSettings& settings) {
     constexpr double kSamples = 16;
     if (!(settings.sample_rate_hz > 0))
-        throw SettingsError(told("can.sample_rate_hz", "none", "samples per second"));
+        throw SettingsError(key_error("can.sample_rate_hz", "none", "samples per second"));
     return std::max(settings.window_s, kSamples / settings.sample_rate_hz);
 }
 
@@ -24,7 +24,7 @@ std::string placed(const WitnessSettings& settings, const std::string& key,
     const auto& place = at == settings.places.end() ? settings.file : at->second;
     const bool by_default = !stated && !settings.file.empty();
     return (place.empty() ? "" : place + ": ") +
-           told(key, by_default ? found + " (default)" : found, expected) + "\n";
+           key_error(key, by_default ? found + " (default)" : found, expected) + "\n";
 }
 
 proto::Dbc dbc_of(const WitnessSettings& settings) {

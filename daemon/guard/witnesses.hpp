@@ -15,7 +15,7 @@
 
 namespace vibrig::guard {
 
-/// What all accelerometers say together at one moment.
+/// What all accelerometers show together at one moment.
 struct Sight {
     bool has_table = false, has_platform = false;
     Motion table, platform;
@@ -50,7 +50,7 @@ class Witnesses {
     void take(std::span<const drivers::ReceivedFrame> frames);
     [[nodiscard]] Sight sight(drivers::Time now) const;
     /// Whether one of them should move and does not: by the other one, and by what the shaker's
-    /// controller says that it does, peak at the table.
+    /// controller reports that it does, peak at the table.
     void doubt(drivers::Time now, double shaker_g) noexcept;
     /// What is judged by: CLOCK_MONOTONIC, or the simulated rig's time where it owns the time.
     [[nodiscard]] drivers::Time time(drivers::Time now) const {

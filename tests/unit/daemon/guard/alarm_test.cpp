@@ -63,14 +63,15 @@ TEST_F(CoilsOnTheWire, AHornThatAcknowledgesAndStaysSilentIsFoundByItsReadBack) 
     Coils coils(settings(server));
     ASSERT_TRUE(coils.show(Tune::none, kSecond)) << coils.note();
     EXPECT_FALSE(coils.show(Tune::disobeyed, 2 * kSecond));
-    EXPECT_NE(coils.note().find("was told on and reads back off"), std::string::npos)
+    EXPECT_NE(coils.note().find("was switched on and reads back off"), std::string::npos)
         << coils.note();
     EXPECT_FALSE(coils.show(Tune::disobeyed, 3 * kSecond));
-    EXPECT_TRUE(eventually([&] { return server.count("coil 3 1") == 2; })) << "told every time";
-    EXPECT_TRUE(coils.show(Tune::none, 4 * kSecond)) << "off it is as told";
+    EXPECT_TRUE(eventually([&] { return server.count("coil 3 1") == 2; }))
+        << "commanded every time";
+    EXPECT_TRUE(coils.show(Tune::none, 4 * kSecond)) << "off it is as commanded";
 }
 
-TEST_F(CoilsOnTheWire, WhatRefusesIsToldAndWhatIsMuteIsSoughtAgain) {
+TEST_F(CoilsOnTheWire, WhatRefusesIsReportedAndWhatIsMuteIsSoughtAgain) {
     const CoilServer refusing("refuses"), mute("mute");
     Coils refused(settings(refusing));
     EXPECT_FALSE(refused.show(Tune::stop, kSecond));
@@ -140,30 +141,30 @@ AlarmSettings with(const Script& script, Time limit = 600 * kSecond) {
     return settings;
 }
 
-TEST(Pager, IsToldWhatHappenedAsJson) {
-    const Script script("cat >told.new && mv told.new told");
+TEST(Pager, GetsWhatHappenedAsJson) {
+    const Script script("cat >paged.new && mv paged.new paged");
     Alarm alarm(with(script));
     alarm.page(Tune::disobeyed, "a \"quoted\"\nline\\ and bytes \xff");
-    ASSERT_TRUE(eventually([&] { return !script.text_of("told").empty(); }));
-    const auto told = nlohmann::json::parse(script.text_of("told"));
-    EXPECT_EQ(told["source"], "vibrig-guard");
-    EXPECT_EQ(told["kind"], "disobeyed");
-    EXPECT_EQ(told["text"].get<std::string>().substr(0, 15), "a \"quoted\"\nline");
-    EXPECT_EQ(told["time"].get<std::string>().size(), 20U);
+    ASSERT_TRUE(eventually([&] { return !script.text_of("paged").empty(); }));
+    const auto paged = nlohmann::json::parse(script.text_of("paged"));
+    EXPECT_EQ(paged["source"], "vibrig-guard");
+    EXPECT_EQ(paged["kind"], "disobeyed");
+    EXPECT_EQ(paged["text"].get<std::string>().substr(0, 15), "a \"quoted\"\nline");
+    EXPECT_EQ(paged["time"].get<std::string>().size(), 20U);
 }
 
 TEST(Pager, OneThatHangsWithAStopDoesNotHoldUpThatTheStopIsNotObeyed) {
-    // GIVEN a command that hangs with its child when it is told of a stop
+    // GIVEN a command that hangs with its child when it gets a stop
     const Script script(
         "cat >text; if grep -q abort text; then sleep 1000 & echo $! >child; wait; else mv text "
-        "told; fi");
+        "paged; fi");
     const auto begun = std::chrono::steady_clock::now();
     {
         Alarm alarm(with(script));
         for (int i = 0; i < 100; ++i) alarm.page(Tune::stop, "stop " + std::to_string(i));
         ASSERT_TRUE(eventually([&] { return script.process_of("child") > 0; }));
         alarm.page(Tune::disobeyed, "not obeyed");
-        EXPECT_TRUE(eventually([&] { return !script.text_of("told").empty(); }));
+        EXPECT_TRUE(eventually([&] { return !script.text_of("paged").empty(); }));
     }
     // THEN nobody has waited for it, and its end took the child along
     EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(300));

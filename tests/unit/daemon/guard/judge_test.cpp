@@ -12,7 +12,7 @@ using proto::GuardCause;
 constexpr std::uint64_t kFirst = 1000;
 constexpr double kLook_s = 0.05;
 
-/// A rig as the guard sees it, and time that goes by. The daemon talks and goes on, unless told
+/// A rig as the guard sees it, and time that goes by. The daemon talks and goes on, unless set
 /// otherwise.
 class World {
   public:

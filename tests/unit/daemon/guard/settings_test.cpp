@@ -176,7 +176,7 @@ TEST(GuardSettings, ASerialLineIsRefusedWithTheReason) {
         << said;
 }
 
-TEST(GuardSettings, EachBadValueIsToldWithPlaceFoundAndExpected) {
+TEST(GuardSettings, EachBadValueIsReportedWithPlaceFoundAndExpected) {
     const auto said = refusal(kGuard + R"([can]
 port = "ethernet"
 sample_rate_hz = nan
@@ -256,7 +256,7 @@ TEST(GuardSettings, EveryKeyOfTheDaemonsMayBeThereAndNoneThatItDoesNotKnow) {
     for (const auto& name : tables_of_the_daemon()) EXPECT_TRUE(daemon_knows(name)) << name;
 }
 
-TEST(GuardSettings, WhatIsNoTomlIsToldWithItsPlace) {
+TEST(GuardSettings, WhatIsNoTomlIsReportedWithItsPlace) {
     EXPECT_EQ(refusal("[guard\n").rfind("rig.toml:1:7: not TOML: ", 0), 0u) << refusal("[guard\n");
     EXPECT_THROW((void)read_settings("/nowhere/rig.toml"), SettingsError);
 }

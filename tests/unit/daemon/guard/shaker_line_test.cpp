@@ -38,7 +38,7 @@ TEST(ShakerLine, ReadsAndWritesNothingWhileNoStopIsWanted) {
     EXPECT_LE(server.requests().size(), 2 * 5u) << "twice a second";
 }
 
-TEST(ShakerLine, StopsAtOnceAndUntilItIsToldThatItMayEnd) {
+TEST(ShakerLine, StopsAtOnceAndUntilItMayEnd) {
     TestServer server;
     server.set_holding(kRun, 1);
     server.set_holding(kRamp, 6000);
@@ -198,7 +198,7 @@ TEST(ShakerLine, WhatWasReadTwoSecondsAgoIsNotKnownAnyMore) {
     EXPECT_FALSE(line.word(3 * kSecond + 1).known);
 }
 
-TEST(ShakerLine, AHostThatCannotBeResolvedIsToldAtTheStart) {
+TEST(ShakerLine, AHostThatCannotBeResolvedIsReportedAtTheStart) {
     const auto settings = parse_settings(
         "guard.socket = \"@g\"\ncommission.simulated = true\n[shaker]\nhost = "
         "\"256.256.256.256\"\n",

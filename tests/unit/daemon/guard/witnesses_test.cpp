@@ -235,7 +235,7 @@ std::string refusal_of(const std::string& text) {
     return "taken";
 }
 
-TEST(Witnesses, WhatTheDbcDoesNotHaveIsToldWithThePlaceOfItsKey) {
+TEST(Witnesses, WhatTheDbcDoesNotHaveIsReportedWithThePlaceOfItsKey) {
     const std::string simulated = "commission.simulated = true\n";
     EXPECT_EQ(refusal_of(simulated + R"([can.signals]
 accel_x = "AccelerometersXY.Q"
@@ -254,7 +254,7 @@ table_accel = "Nobody.Axial"
               "the platform, expected one of both at least: the guard would see nothing\n");
 }
 
-TEST(Witnesses, ADbcThatDoesNotFitIsToldWithThePlaceOfItsKey) {
+TEST(Witnesses, ADbcThatDoesNotFitIsReportedWithThePlaceOfItsKey) {
     const std::string simulated = "commission.simulated = true\n";
     EXPECT_EQ(
         refusal_of(simulated + "[can]\ndbc = \"/nowhere/bus.dbc\"\n"),
