@@ -234,7 +234,7 @@ void Daemon::refused(const std::string& who, const std::string& what, const std:
                       fmt::format("refused {} ({}): {}", what, who, why));
 }
 
-void Daemon::told(Severity severity, const std::string& text) {
+void Daemon::log_event(Severity severity, const std::string& text) {
     parts_.events.log(severity, "server", text);
 }
 

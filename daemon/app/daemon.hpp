@@ -62,7 +62,7 @@ class Daemon final : public StatusSource {
     }
     void refused(const std::string& who, const std::string& what, const std::string& why) override;
     StatusData serving(const ServerStatus& server) override;
-    void told(Severity severity, const std::string& text) override;
+    void log_event(Severity severity, const std::string& text) override;
 
   private:
     // The parts of start(), in its order.

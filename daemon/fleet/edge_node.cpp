@@ -26,7 +26,7 @@ struct Reading {
 };
 
 /// What is not known now: a number is null, the others are what they are without it.
-Value told(const StatusValue& row, const StatusData& status) {
+Value known_value(const StatusValue& row, const StatusData& status) {
     static const std::array<Value, 4> kUnknown{
         false, std::uint64_t{0}, std::numeric_limits<double>::quiet_NaN(), std::string()};
     const StatusScalar value = row.value(status);
@@ -42,7 +42,8 @@ std::vector<Reading> readings_of(const StatusData& s) {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     std::vector<Reading> readings;
     for (const StatusValue& row : status_values())
-        if (row.mqtt_name != nullptr) readings.push_back({row.mqtt_name, row.unit, told(row, s)});
+        if (row.mqtt_name != nullptr)
+            readings.push_back({row.mqtt_name, row.unit, known_value(row, s)});
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const bool known = s.estimate.observable[i];
         const std::string name = std::string("Coefficients/") + estimator::parameter_names()[i];
@@ -112,11 +113,11 @@ std::string EdgeNode::birth(const StatusData& status) {
     rebirth.set_timestamp(payload.timestamp());
     rebirth.set_datatype(kBoolean);
     rebirth.set_boolean_value(false);
-    told_.clear();
+    published_.clear();
     for (Reading& reading : readings_of(status)) {
         Payload::Metric& metric = *payload.add_metrics();
         metric.set_name(reading.name);
-        metric.set_alias(told_.size());
+        metric.set_alias(published_.size());
         metric.set_timestamp(payload.timestamp());
         if (*reading.unit != '\0') {
             metric.mutable_properties()->add_keys("engUnit");
@@ -125,7 +126,7 @@ std::string EdgeNode::birth(const StatusData& status) {
             unit.set_string_value(reading.unit);
         }
         set(metric, reading.value);
-        told_.push_back(std::move(reading.value));
+        published_.push_back(std::move(reading.value));
     }
     return payload.SerializeAsString();
 }
@@ -134,13 +135,13 @@ std::string EdgeNode::data(const StatusData& status) {
     Payload payload;
     payload.set_timestamp(milliseconds_of(status.utc_ns));
     std::vector<Reading> readings = readings_of(status);
-    for (std::size_t i = 0; i < readings.size() && i < told_.size(); ++i) {
-        if (same(readings[i].value, told_[i])) continue;
+    for (std::size_t i = 0; i < readings.size() && i < published_.size(); ++i) {
+        if (same(readings[i].value, published_[i])) continue;
         Payload::Metric& metric = *payload.add_metrics();
         metric.set_alias(i);
         metric.set_timestamp(payload.timestamp());
         set(metric, readings[i].value);
-        told_[i] = std::move(readings[i].value);
+        published_[i] = std::move(readings[i].value);
     }
     if (payload.metrics_size() == 0) return {};
     payload.set_seq(sequence_);

@@ -33,7 +33,7 @@ class EdgeNode {
   private:
     std::uint64_t session_ = 255;  ///< bdSeq, 0 to 255
     std::uint64_t sequence_ = 0;   ///< of the next payload, 0 to 255
-    std::vector<Value> told_;
+    std::vector<Value> published_;
 };
 
 }  // namespace vibrig::fleet

@@ -252,7 +252,8 @@ struct Publisher::Impl {
         now.left_out += room ? 0 : 1;
     }
 
-    /// A broker publishes the will of a connection that breaks; of one that ends it has to be told.
+    /// A broker publishes the will of a connection that breaks; one that ends has to publish its
+    /// own.
     void say_farewell(Connection& link) {
         publish(link, "NDEATH", node.death(source.status().utc_ns), kAtLeastOnce);
         const auto end = Clock::now() + kFarewellTime;

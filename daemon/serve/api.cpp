@@ -285,9 +285,9 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
     }
 }
 
-void Api::turned_away(const Caller& caller, const std::string& why, TokenBucket& told) {
+void Api::turned_away(const Caller& caller, const std::string& why, TokenBucket& logged) {
     ++traffic.turned_away;
-    if (!told.take(std::chrono::steady_clock::now())) return;
+    if (!logged.take(std::chrono::steady_clock::now())) return;
     // With TLS it begins with ", from" until there is a certificate.
     const bool nameless = caller.identity.rfind(',', 0) == 0;
     source_.refused((nameless ? "somebody" : "") + caller.identity, "a connection", why);
@@ -297,8 +297,8 @@ ApiAnswer Api::refuse(int status, const Caller& caller, const std::string& what,
                       const std::string& why) {
     ++traffic.refused;
     const auto now = std::chrono::steady_clock::now();
-    if (TokenBucket& told = told_.of(caller.identity, now); told.take(now)) {
-        const std::uint64_t missed = told.missed();
+    if (TokenBucket& logged = logged_.of(caller.identity, now); logged.take(now)) {
+        const std::uint64_t missed = logged.missed();
         source_.refused(
             caller.identity, what,
             missed == 0 ? why : why + "; before that " + std::to_string(missed) + " more");
@@ -405,8 +405,8 @@ std::variant<ApiAnswer, CommandRequest> Api::command_of(const ApiRequest& reques
     // audit line has both.
     parsed.by += " (" + caller.identity + ")";
     if (caller.expired)
-        source_.told(Severity::warning,
-                     "an abort is taken from an expired certificate: " + parsed.by);
+        source_.log_event(Severity::warning,
+                          "an abort is taken from an expired certificate: " + parsed.by);
     return parsed;
 }
 

@@ -53,8 +53,8 @@ class Api {
     /// Why a browser's request is refused before it is looked at; status 200: it is not.
     [[nodiscard]] ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
-    /// One who did not get as far as a request; told of while `told` lasts.
-    void turned_away(const Caller& caller, const std::string& why, TokenBucket& told);
+    /// One who did not get as far as a request; logged while `logged` lasts.
+    void turned_away(const Caller& caller, const std::string& why, TokenBucket& logged);
 
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
     [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
@@ -77,7 +77,7 @@ class Api {
     /// The command of the request; else why there is none to be carried out.
     [[nodiscard]] std::variant<ApiAnswer, CommandRequest> command_of(const ApiRequest& request,
                                                                      const Caller& caller);
-    /// What is told of is limited: a flood must not drown the events.
+    /// What is logged is limited: a flood must not drown the events.
     ApiAnswer refuse(int status, const Caller& caller, const std::string& what,
                      const std::string& why);
 
@@ -88,7 +88,7 @@ class Api {
     StreamFeed feed_;
     History history_;
     TokenBuckets commands_{10, 50};
-    TokenBuckets told_{0.1, 20};  ///< refusals that are told of
+    TokenBuckets logged_{0.1, 20};  ///< refusals that are logged
 };
 
 /// The value of `name` in "a=1&b=2"; empty: it is not there.

@@ -6,7 +6,7 @@
 namespace vibrig::serve {
 
 /// What somebody may do; each includes the ones before it. An administrator may do what an operator
-/// may; the certificates of both are told apart in the audit.
+/// may; the certificates of both are distinguished in the audit.
 enum class Role : std::uint8_t { none, viewer, operate, administer };
 [[nodiscard]] const char* name_of(Role role) noexcept;
 /// "viewer", "operator", "admin"; none for anything else.

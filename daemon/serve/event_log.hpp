@@ -21,7 +21,6 @@ class EventLog {
     std::uint64_t append(EventRecord event);
     /// The oldest `at_most` events with an id above `after_id`, oldest first.
     [[nodiscard]] std::vector<EventRecord> after(std::uint64_t after_id, std::size_t at_most) const;
-    /// Of the newest event; 0: none yet.
 
   private:
     const std::size_t capacity_;

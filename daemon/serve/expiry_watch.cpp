@@ -24,14 +24,15 @@ std::string date_of(std::int64_t utc_s) {
     return text.data();
 }
 
-std::string ExpiryWatch::look(const std::string& whose, std::int64_t expires, std::int64_t now) {
-    if (told_.size() >= kMostKnown && told_.find(whose) == told_.end()) told_.clear();
-    auto& [known, told] = told_[whose];
-    if (known != expires) told = 0;  // a renewed one
+std::string ExpiryWatch::check(const std::string& whose, std::int64_t expires, std::int64_t now) {
+    if (reported_.size() >= kMostKnown && reported_.find(whose) == reported_.end())
+        reported_.clear();
+    auto& [known, reported] = reported_[whose];
+    if (known != expires) reported = 0;  // a renewed one
     known = expires;
     const int stage = stage_of(expires - now);
-    if (stage <= told) return {};
-    told = stage;
+    if (stage <= reported) return {};
+    reported = stage;
     const std::string date = date_of(expires);
     if (stage == 3) return whose + " has expired on " + date + ": renew it with `vibrig pki init`";
     const std::int64_t days = (expires - now) / kDay_s;

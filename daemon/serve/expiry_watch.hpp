@@ -14,14 +14,14 @@ namespace vibrig::serve {
 /// each once.
 class ExpiryWatch {
   public:
-    /// What is to be told now; empty: nothing. Times in s, UTC.
-    [[nodiscard]] std::string look(const std::string& whose, std::int64_t expires,
-                                   std::int64_t now);
+    /// What is to be reported now; empty: nothing. Times in s, UTC.
+    [[nodiscard]] std::string check(const std::string& whose, std::int64_t expires,
+                                    std::int64_t now);
 
   private:
     static constexpr std::size_t kMostKnown = 1000;  // strangers cannot fill it: all are certified
-    /// When it ends, and what has been told of it.
-    std::map<std::string, std::pair<std::int64_t, int>> told_;
+    /// When it ends, and what has been reported of it.
+    std::map<std::string, std::pair<std::int64_t, int>> reported_;
 };
 
 }  // namespace vibrig::serve

@@ -166,7 +166,7 @@ void add_acquisition(Families& to, const StatusData& s) {
     const auto& a = s.assembler;
     using Controller = drivers::ControllerState;
     to.gauge("vibrig_can_controller_state",
-             "1 for the state that the CAN controller says it is in, by error frames.",
+             "1 for the state that the CAN controller reports, by error frames.",
              {{{{"state", "active"}}, yes(can.controller == Controller::active)},
               {{{"state", "warning"}}, yes(can.controller == Controller::warning)},
               {{{"state", "passive"}}, yes(can.controller == Controller::passive)},

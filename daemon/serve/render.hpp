@@ -18,7 +18,7 @@ struct Rates {
     bool known = false;
     double samples_per_s = 0;
     double frames_per_s = 0;
-    double speed = 1;  ///< daemon's clock over wall clock, 1
+    double speed = 1;  ///< daemon's time over wall time, 1
 };
 /// Unknown when the daemon has started anew in between or its clock stood still.
 [[nodiscard]] Rates rates_between(const v1::Status& before, const v1::Status& after, double wall_s);

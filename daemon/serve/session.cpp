@@ -234,7 +234,7 @@ class Session : public std::enable_shared_from_this<Session> {
             who.identity += from;
             // Nothing but a stop is taken, and one needs no place.
             if (who.expired) return self->read();
-            // Without a place one stays a newcomer until the first request, to be told so.
+            // Without a place one stays a newcomer until the first request, which says so.
             self->take_place();
             self->read();
         });
@@ -259,7 +259,7 @@ class Session : public std::enable_shared_from_this<Session> {
         if (place_) shared_.newcomers.remove(&stream_);
         return place_ != nullptr;
     }
-    void none_left() { shared_.api.turned_away(caller_, places_.none_left(), places_.told); }
+    void none_left() { shared_.api.turned_away(caller_, places_.none_left(), places_.logged); }
     void turn_away() {
         none_left();
         error_code ignored;

@@ -25,7 +25,7 @@ struct Places {
     std::string door;  ///< "the page"
     std::size_t most;
     std::size_t taken = 0;
-    TokenBucket told{1. / 60, 1};  ///< of a full door, once a minute
+    TokenBucket logged{1. / 60, 1};  ///< a full door, once a minute
 
     /// Null: none is left.
     [[nodiscard]] Place take() { return Place(taken < most ? &++taken : nullptr); }
@@ -38,7 +38,7 @@ struct Places {
 struct Shared {
     Api& api;
     const ServerLimits& limits;
-    TokenBucket strangers{1, 20};  ///< that are told of
+    TokenBucket strangers{1, 20};  ///< that are logged
     TokenBucket crowd{1. / 60, 1};
     /// Who has not shown a certificate, the oldest first: these take no places from those who have.
     std::list<AnyStream*> newcomers = {};

@@ -24,7 +24,7 @@ class Verdict;
 namespace vibrig::serve {
 
 void fill(v1::Status& out, const StatusData& status);
-/// Of a part of it, "journal.", what daemon/status/values.hpp has of it.
+/// Fills a part of it, "journal.", with what daemon/status/values.hpp has of it.
 void fill_values(google::protobuf::Message& out, std::string_view part, const StatusData& status);
 /// Part of it: guard and annunciator, where they are configured.
 void fill_outside(v1::Status& out, const StatusData& status);

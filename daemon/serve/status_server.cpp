@@ -40,9 +40,9 @@ using Protocol = asio::generic::stream_protocol;
 using boost::system::error_code;
 
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-constexpr auto kCertificateLook = std::chrono::seconds(1);
+constexpr auto kCertificatePeriod = std::chrono::seconds(1);
 constexpr auto kLife = std::chrono::milliseconds(500);
-constexpr auto kDoorLook = std::chrono::seconds(1);
+constexpr auto kDoorPeriod = std::chrono::seconds(1);
 constexpr std::array<const char*, 4> kDoorNames{"control", "status", "page", "remote"};
 
 /// Changes whenever one of the files does.
@@ -99,7 +99,7 @@ struct StatusServer::Impl {
         std::string address;                 ///< of that, HOST:PORT
         int misses = 0;                      ///< of the probe, in a row
         bool paused = false;                 ///< out of descriptors, mostly
-        ServerStatus::Door told;
+        ServerStatus::Door shown;
         asio::basic_socket_acceptor<Protocol> acceptor;
         asio::steady_timer pause;
     };
@@ -121,7 +121,7 @@ struct StatusServer::Impl {
             certificates_seen = stamp_of(settings);
             tls.emplace(read_certificates());
             read_ends();
-            look_at_certificates();
+            check_certificates();
             remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
         }
     }
@@ -131,7 +131,7 @@ struct StatusServer::Impl {
         commands.emplace(source);
         api.history().expect(source.plan());
         show_life();
-        look_at_doors();
+        check_doors();
         // Signals are for the main thread.
         sigset_t all, before;
         sigfillset(&all);
@@ -162,7 +162,7 @@ struct StatusServer::Impl {
         SocketFile file = make_socket(door, path);
         Listener& made = listeners.emplace_back(io, door, Protocol(AF_UNIX, 0), file.release());
         made.file.emplace(std::move(file));
-        made.told.address = path;
+        made.shown.address = path;
     }
 
     /// A stop goes past all that waits; the rest must not hold up who comes next.
@@ -182,43 +182,42 @@ struct StatusServer::Impl {
     }
 
     /// A door that nobody finds is no door: whoever removed it, it is made anew.
-    void look_at_doors() {
-        for (Listener& listener : listeners)
-            listener.file ? look_at(listener) : look_at_tcp(listener);
-        door_look.expires_after(kDoorLook);
-        door_look.async_wait([this](error_code error) {
-            if (!error) look_at_doors();
+    void check_doors() {
+        for (Listener& listener : listeners) listener.file ? check(listener) : check_tcp(listener);
+        door_timer.expires_after(kDoorPeriod);
+        door_timer.async_wait([this](error_code error) {
+            if (!error) check_doors();
         });
     }
-    void look_at(Listener& listener) {
-        ServerStatus::Door& told = listener.told;
+    void check(Listener& listener) {
+        ServerStatus::Door& shown = listener.shown;
         const std::string wrong = listener.file->problem();
         if (wrong.empty()) {
-            told.open = true;
-            told.note.clear();
+            shown.open = true;
+            shown.note.clear();
             return;
         }
         const std::string door = std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) +
-                                 " socket " + told.address;
+                                 " socket " + shown.address;
         try {
-            SocketFile::make_room(told.address);
-            SocketFile fresh = make_socket(listener.door, told.address);
+            SocketFile::make_room(shown.address);
+            SocketFile fresh = make_socket(listener.door, shown.address);
             error_code ignored;
             listener.acceptor.close(ignored);
             listener.acceptor.assign(Protocol(AF_UNIX, 0), fresh.release());
             listener.file.emplace(std::move(fresh));
             accept(listener);
-            source.told(Severity::alarm, told.open ? door + ' ' + wrong + ": made anew"
-                                                   : door + ": made anew at last");
-            told.open = true;
-            told.note.clear();
-            ++told.made_anew;
+            source.log_event(Severity::alarm, shown.open ? door + ' ' + wrong + ": made anew"
+                                                         : door + ": made anew at last");
+            shown.open = true;
+            shown.note.clear();
+            ++shown.made_anew;
         } catch (const std::exception& error) {
-            if (told.open || told.note != error.what())
-                source.told(Severity::alarm, door + (told.open ? ' ' + wrong : "") +
-                                                 " and cannot be made anew: " + error.what());
-            told.open = false;
-            told.note = error.what();
+            if (shown.open || shown.note != error.what())
+                source.log_event(Severity::alarm, door + (shown.open ? ' ' + wrong : "") +
+                                                      " and cannot be made anew: " + error.what());
+            shown.open = false;
+            shown.note = error.what();
         }
     }
 
@@ -227,31 +226,31 @@ struct StatusServer::Impl {
     }
     std::string open_tcp(Door door, const TcpListener& opened) {
         Listener& made = listeners.emplace_back(io, door, tcp(opened.address), opened.descriptor);
-        made.told.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
+        made.shown.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
         made.address = opened.address;
         made.probe.emplace(opened.address);
         return opened.address;
     }
-    /// As a Unix door, but what a connection comes to is known a look later; and one that is late
+    /// As a Unix door, but what a connection comes to is known a check later; and one that is late
     /// may have been held up by this thread itself.
-    void look_at_tcp(Listener& listener) {
+    void check_tcp(Listener& listener) {
         constexpr int kMisses = 2;
-        ServerStatus::Door& told = listener.told;
+        ServerStatus::Door& shown = listener.shown;
         const std::string door = std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) +
-                                 " door " + told.address;
+                                 " door " + shown.address;
         const std::string wrong = listener.paused ? "" : listener.probe->problem();
         if (!wrong.empty()) {
             if (++listener.misses >= kMisses) make_tcp_anew(listener, door, wrong);
         } else if (listener.probe->arrived()) {
-            if (!told.open) source.told(Severity::alarm, door + " takes connections again");
+            if (!shown.open) source.log_event(Severity::alarm, door + " takes connections again");
             listener.misses = 0;
-            told.open = true;
-            told.note.clear();
+            shown.open = true;
+            shown.note.clear();
         }
         listener.probe->begin();
     }
     void make_tcp_anew(Listener& listener, const std::string& door, const std::string& wrong) {
-        ServerStatus::Door& told = listener.told;
+        ServerStatus::Door& shown = listener.shown;
         std::string note = wrong;
         error_code ignored;
         listener.acceptor.close(ignored);  // it holds the port
@@ -262,17 +261,17 @@ struct StatusServer::Impl {
                            listener.address, listener.door == Door::page);
             listener.acceptor.assign(tcp(fresh.address), fresh.descriptor);
             accept(listener);
-            if (told.open) source.told(Severity::alarm, door + ' ' + wrong + ": made anew");
-            ++told.made_anew;
+            if (shown.open) source.log_event(Severity::alarm, door + ' ' + wrong + ": made anew");
+            ++shown.made_anew;
         } catch (const std::exception& error) {
             note = error.what();
-            if (told.open || told.note != note)
-                source.told(Severity::alarm,
-                            door + ' ' + wrong + " and cannot be made anew: " + note);
+            if (shown.open || shown.note != note)
+                source.log_event(Severity::alarm,
+                                 door + ' ' + wrong + " and cannot be made anew: " + note);
         }
         // It counts as open when a connection has come through.
-        told.open = false;
-        told.note = note;
+        shown.open = false;
+        shown.note = note;
     }
 
     [[nodiscard]] asio::ssl::context read_certificates() const {
@@ -286,10 +285,10 @@ struct StatusServer::Impl {
                     {"authority", expiry_of(settings.clients_ca, false), true}};
     }
 
-    [[nodiscard]] ServerStatus look_around() {
+    [[nodiscard]] ServerStatus server_status() {
         ServerStatus status;
         for (const Listener& listener : listeners) {
-            status.doors.push_back(listener.told);
+            status.doors.push_back(listener.shown);
             status.doors.back().name = kDoorNames[static_cast<std::size_t>(listener.door)];
         }
         status.certificates = own_ends;
@@ -304,14 +303,14 @@ struct StatusServer::Impl {
     }
 
     void show_life() {
-        const ServerStatus status = look_around();
+        const ServerStatus status = server_status();
         api.history().add(source.serving(status));
         const auto now = static_cast<std::int64_t>(std::time(nullptr));
         for (const auto& certificate : status.certificates) {
-            const auto words = expiry_watch.look(
+            const auto words = expiry_watch.check(
                 (certificate.own ? "certificate of the " : "") + certificate.whose,
                 certificate.expires, now);
-            if (!words.empty()) source.told(Severity::alarm, words);
+            if (!words.empty()) source.log_event(Severity::alarm, words);
         }
         life.expires_after(kLife);
         life.async_wait([this](error_code error) {
@@ -320,9 +319,9 @@ struct StatusServer::Impl {
     }
 
     /// Takes over renewed certificates and a longer list of revoked ones while it runs.
-    void look_at_certificates() {
-        certificate_look.expires_after(kCertificateLook);
-        certificate_look.async_wait([this](error_code error) {
+    void check_certificates() {
+        certificate_timer.expires_after(kCertificatePeriod);
+        certificate_timer.async_wait([this](error_code error) {
             if (error) return;
             if (auto stamp = stamp_of(settings); stamp != certificates_seen) {
                 certificates_seen = std::move(stamp);
@@ -334,7 +333,7 @@ struct StatusServer::Impl {
                     source.refused("server", "changed certificates", wrong.what());
                 }
             }
-            look_at_certificates();
+            check_certificates();
         });
     }
 
@@ -368,7 +367,7 @@ struct StatusServer::Impl {
     }
 
     void welcome(Door door, AnyStream::Socket socket) {
-        // Gone again without a word, as look_at() is.
+        // Gone again without a word, as check() is.
         char nothing = 0;
         if (::recv(socket.native_handle(), &nothing, 1, MSG_PEEK | MSG_DONTWAIT) == 0) return;
         Caller caller;
@@ -420,8 +419,8 @@ struct StatusServer::Impl {
     std::string page, remote;
     asio::io_context io{1};
     asio::steady_timer life{io};
-    asio::steady_timer certificate_look{io};
-    asio::steady_timer door_look{io};
+    asio::steady_timer certificate_timer{io};
+    asio::steady_timer door_timer{io};
     std::string certificates_seen;
     std::vector<CertificateStatus> own_ends;
     ExpiryWatch expiry_watch;

@@ -56,7 +56,8 @@ struct ZeroStatus {
     std::array<double, 3> zero_mg{}, sigma_mg{};
     std::array<std::array<double, 3>, 3> covariance_mg2{};
     double scale_z = 0, scale_z_sigma = 0;  ///< 0: not separated
-    /// Of x and y towards the axis of the slews as the gyros see it, rad; sigma 0: not separated.
+    /// Tilt of x and y towards the axis of the slews as the gyros see it, rad; sigma 0: not
+    /// separated.
     std::array<double, 2> misalignment{}, misalignment_sigma{};
     bool repeated = false;  ///< at the end of the campaign
     std::array<double, 3> change_mg{}, change_sigma_mg{};
@@ -138,7 +139,7 @@ struct VerdictStatus {
     std::string word, sentence;
     double widening = 1;    ///< of the uncertainty over that of noise alone, median
     bool complete = false;  ///< of the whole campaign, which is over
-    /// Of a dwell's drift, by gyro, deg/h.
+    /// Residual of a dwell's drift, by gyro, deg/h.
     struct Residual {
         int run = 0, position = 0;
         double time_h = 0;

@@ -42,11 +42,11 @@ class StatusSource {
     [[nodiscard]] virtual PlanData plan() const { return {}; }
     /// The unit's earlier campaigns, JSON as of `vibrig trend`; empty: none are known.
     [[nodiscard]] virtual std::string unit_history() const { return {}; }
-    /// The server's thread goes on, and this is how its doors are; told twice a second. The status
-    /// at that moment is for its history.
+    /// The server's thread goes on, and this is how its doors are; called twice a second. The
+    /// status at that moment is for its history.
     virtual StatusData serving(const ServerStatus& /*server*/) { return {}; }
     /// Something that somebody has to know of the server.
-    virtual void told(Severity /*severity*/, const std::string& /*text*/) {}
+    virtual void log_event(Severity /*severity*/, const std::string& /*text*/) {}
     /// A command that was not let through: who wanted what, and why not.
     virtual void refused(const std::string& /*who*/, const std::string& /*what*/,
                          const std::string& /*why*/) {}

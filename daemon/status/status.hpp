@@ -91,7 +91,7 @@ struct StatusData {
     std::string rate_misfit;    ///< why it is not the configured one
     std::string clock_misfit;   ///< why rig and daemon have no time in common
     drivers::PlatformStatus platform;
-    /// Of the accelerometers against the command: platform and table, g peak at the table;
+    /// The accelerometers against the command: platform and table, g peak at the table;
     /// negative: not known.
     std::array<double, 2> witness_g{-1, -1};
     VibrationStatus vibration;

@@ -286,7 +286,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("real_time.deadline_ms", "ms", [](auto& s) { return s.real_time.deadline_ms; }),
 
     row("", "", [](auto& s) { return !platform_good(s); })
-        .gauge("vibrig_platform_silent", "1 while it has said nothing within its deadline."),
+        .gauge("vibrig_platform_silent", "1 while it has sent nothing within its deadline."),
     row("", "", [](auto& s) { return s.platform.time != 0 && s.platform.ready; })
         .mqtt("Platform/Ready"),
     row("", "degC", [](auto& s) { return only(s.platform.time != 0, s.platform.temperature_c); })
@@ -295,7 +295,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("platform.time_s", "s",
         [](auto& s) { return only(s.platform.time != 0, drivers::to_seconds(s.platform.time)); }),
     row("platform.ready", "", [](auto& s) { return only(platform_good(s), s.platform.ready); })
-        .gauge("vibrig_platform_ready", "1 while the platform says so.")
+        .gauge("vibrig_platform_ready", "1 while the platform reports it.")
         .shown("platform", "ready", "NOT READY").off_page(),
     row("platform.loop_closed", "",
         [](auto& s) { return only(platform_good(s), s.platform.loop_closed); })
@@ -309,7 +309,7 @@ const auto kValues = std::to_array<StatusValue>({
         .shown("platform", "FAULT").off_page(),
     row("platform.temperature_c", "degC",
         [](auto& s) { return only(platform_good(s), s.platform.temperature_c); })
-        .gauge("vibrig_platform_temperature_celsius", "As the platform says.")
+        .gauge("vibrig_platform_temperature_celsius", "As the platform reports.")
         .shown("platform", "{}", "").with_decimals(2).off_page(),
     row("platform.gimbal_time_s", "s", [](auto& s) {
         return only(s.platform.gimbal_time != 0, drivers::to_seconds(s.platform.gimbal_time)); }),
@@ -422,7 +422,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("annunciator.horn", "", [](auto& s) { return s.annunciator.horn; }),
     row("annunciator.confirms", "", [](auto& s) { return s.annunciator.confirms; }),
     row("", "", [](auto& s) { return only(s.annunciator.horn, s.annunciator.confirms); })
-        .gauge("vibrig_annunciator_confirms", "1 while horn and lamp read back as told."),
+        .gauge("vibrig_annunciator_confirms", "1 while horn and lamp read back as commanded."),
     row("annunciator.horn_note", "", [](auto& s) { return s.annunciator.horn_note; }),
     row("annunciator.pattern", "", [](auto& s) { return drivers::name_of(s.annunciator.pattern); }),
     row("annunciator.command", "", [](auto& s) { return s.annunciator.command; }),

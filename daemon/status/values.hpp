@@ -21,12 +21,13 @@ using StatusScalar = std::variant<std::monostate, bool, std::uint64_t, double, s
 /// A single value of the status under all its names. What shows the status takes it from here: the
 /// messages of proto/vibrig.proto and so JSON, Prometheus, MQTT, `vibrig status` and the live page.
 struct StatusValue {
-    /// Of v1::Status, with the message it stands in: "shaker.measured_g". Empty: in none as such.
+    /// Field of v1::Status, with the message it stands in: "shaker.measured_g". Empty: in none as
+    /// such.
     const char* field;
     const char* unit;  ///< for people and MQTT; empty: none
     std::size_t kind;  ///< of the value where it is known, as index of StatusScalar
     StatusScalar (*value)(const StatusData&);
-    const char* mqtt_name = nullptr;  ///< null: not told there
+    const char* mqtt_name = nullptr;  ///< null: not published there
     double mqtt_factor = 1;
     const char* metric = nullptr;  ///< null: likewise
     const char* help = nullptr;    ///< of the metric
@@ -99,7 +100,7 @@ struct StatusValue {
            row.kind == StatusScalar(double{}).index();
 }
 
-/// All of them; those with a name for MQTT in the order in which they are told there.
+/// All of them; those with a name for MQTT in the order in which they are published.
 [[nodiscard]] std::span<const StatusValue> status_values();
 
 }  // namespace vibrig

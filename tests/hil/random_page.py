@@ -70,7 +70,7 @@ def look(checks, programs, folder):
         commanded, hidden = page.ask("evaluate", script="window.sine").get("value") or ("", None)
         checks.check(commanded.endswith(" g peak"), "and its peak", commanded)
         checks.equal(hidden, True, "a sine has no PSD")
-        until("then a random dwell", f"{recording} && ({ROWS}).kind === 'random' && ({ROWS})['controller says'] === 'at level' && ({ROWS}).table !== 'not known'")
+        until("then a random dwell", f"{recording} && ({ROWS}).kind === 'random' && ({ROWS})['controller reports'] === 'at level' && ({ROWS}).table !== 'not known'")
         under_random(checks, page, rows_of(page))
         shots(checks, page, "random")
         live_page.check_accessible(checks, page, "under random vibration")

@@ -301,7 +301,7 @@
     const seen = (name, x) => (x === undefined ? [name, 'not known', false]
       : [name, x.toFixed(3) + unit, steady && low !== undefined && (x < low || x > high)]);
     table('vibration', [['kind', v.kind], ...(v.kind === 'rest' ? [] : [
-      ...(random ? [['profile', `${v.profile || 'unknown'} (number ${v.number}), ${v.level_db.toFixed(1)} dB`], ['controller says', v.control, v.control === 'aborted']]
+      ...(random ? [['profile', `${v.profile || 'unknown'} (number ${v.number}), ${v.level_db.toFixed(1)} dB`], ['controller reports', v.control, v.control === 'aborted']]
         : [['frequency', v.kind === 'sweep' ? v.words : v.frequency_hz.toFixed(2) + ' Hz']]),
       ['commanded', v.commanded_g.toFixed(3) + unit], seen('controller', v.controller_g), seen('platform', v.platform_g), seen('table', v.table_g),
       ...(low === undefined ? [] : [['band', `${low.toFixed(3)} to ${high.toFixed(3)}${unit}`]])])]);

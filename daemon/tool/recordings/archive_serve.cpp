@@ -27,7 +27,7 @@ class NoRig final : public StatusSource {
     CommandReply command(const CommandRequest& /*request*/) override {
         return {false, "an archive takes no commands"};
     }
-    void told(Severity /*severity*/, const std::string& text) override {
+    void log_event(Severity /*severity*/, const std::string& text) override {
         std::cerr << text << '\n';
     }
     void refused(const std::string& who, const std::string& what, const std::string& why) override {

@@ -9,7 +9,7 @@
 #include "proto/sparkplug.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 
-// What a Sparkplug B host is told; tests/hil/mqtt.py reads the same through a broker.
+// What is published to a Sparkplug B host; tests/hil/mqtt.py reads the same through a broker.
 namespace vibrig::fleet {
 namespace {
 

@@ -14,7 +14,7 @@ TEST(ExpiryWatch, SpeaksThirtyDaysBeforeSevenDaysBeforeAndAtTheEndOnceEach) {
     std::string all;
     // GIVEN a certificate looked at every hour for 40 days before its end and one after
     for (std::int64_t now = kEnd - 40 * kDay; now <= kEnd + kDay; now += 3600) {
-        const std::string said = watch.look("the server's certificate", kEnd, now);
+        const std::string said = watch.check("the server's certificate", kEnd, now);
         if (said.empty()) continue;
         ++words;
         all += said + '\n';
@@ -29,17 +29,17 @@ TEST(ExpiryWatch, SpeaksThirtyDaysBeforeSevenDaysBeforeAndAtTheEndOnceEach) {
 
 TEST(ExpiryWatch, SpeaksAtOnceAboutAnEndThatIsNear) {
     ExpiryWatch watch;
-    EXPECT_NE(watch.look("a", kEnd, kEnd - kDay / 2).find("less than a day"), std::string::npos);
-    EXPECT_EQ(watch.look("a", kEnd, kEnd - kDay / 2), "");
-    EXPECT_NE(watch.look("b", kEnd, kEnd + 5).find("expired"), std::string::npos)
+    EXPECT_NE(watch.check("a", kEnd, kEnd - kDay / 2).find("less than a day"), std::string::npos);
+    EXPECT_EQ(watch.check("a", kEnd, kEnd - kDay / 2), "");
+    EXPECT_NE(watch.check("b", kEnd, kEnd + 5).find("expired"), std::string::npos)
         << "each has an end of its own";
 }
 
 TEST(ExpiryWatch, StartsAnewWithARenewedCertificate) {
     ExpiryWatch watch;
-    EXPECT_NE(watch.look("a", kEnd, kEnd - 3 * kDay), "");
-    EXPECT_EQ(watch.look("a", kEnd + 800 * kDay, kEnd - 3 * kDay), "");
-    EXPECT_NE(watch.look("a", kEnd + 800 * kDay, kEnd + 790 * kDay), "");
+    EXPECT_NE(watch.check("a", kEnd, kEnd - 3 * kDay), "");
+    EXPECT_EQ(watch.check("a", kEnd + 800 * kDay, kEnd - 3 * kDay), "");
+    EXPECT_NE(watch.check("a", kEnd + 800 * kDay, kEnd + 790 * kDay), "");
 }
 
 }  // namespace

@@ -56,13 +56,13 @@ class FakeSource : public StatusSource {
         return reply_;
     }
 
-    void told(Severity severity, const std::string& text) override {
+    void log_event(Severity severity, const std::string& text) override {
         const std::lock_guard lock(mutex_);
-        told_ += std::string(name_of(severity)) + ": " + text + '\n';
+        logged_ += std::string(name_of(severity)) + ": " + text + '\n';
     }
-    [[nodiscard]] std::string told_of() const {
+    [[nodiscard]] std::string logged() const {
         const std::lock_guard lock(mutex_);
-        return told_;
+        return logged_;
     }
     StatusData serving(const ServerStatus& server) override {
         const std::lock_guard lock(mutex_);
@@ -108,7 +108,7 @@ class FakeSource : public StatusSource {
     CommandReply reply_{true, "done"};
     std::vector<CommandRequest> requests_;
     std::vector<std::string> refusals_;
-    std::string told_;
+    std::string logged_;
     ServerStatus server_;
 };
 

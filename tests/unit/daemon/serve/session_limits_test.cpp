@@ -137,7 +137,7 @@ TEST_F(ServerLimitsTest, TurnAwayOneConnectionTooMany) {
         taken.emplace_back(path).send(kHealth);
         ASSERT_EQ(status_of(taken.back().answer()), 200) << i;
     }
-    // WHEN one more comes, THEN it is told so
+    // WHEN one more comes, THEN the answer says so
     for (int i = 0; i < 10; ++i) {
         const RawConnection extra(path);
         extra.send(kHealth);

@@ -66,7 +66,7 @@ class Access : public testing::Test {
         return {"", without_scheme(server->remote_address()), folder.file(name)};
     }
     /// Waits until a refusal with these words is audited.
-    [[nodiscard]] bool told(const std::string& words) const {
+    [[nodiscard]] bool logged(const std::string& words) const {
         for (int i = 0; i < 500; ++i) {
             for (const std::string& refusal : source.refusals())
                 if (refusal.find(words) != std::string::npos) return true;
@@ -150,7 +150,7 @@ TEST_F(Access, BadCertificatesAreRefused) {
     struct Row {
         const char* what;
         Identity identity;
-        const char* told;  ///< in the events
+        const char* logged;  ///< in the events
     };
     const std::vector<Row> bad{
         {"not yet valid", make_identity({Use::client, "a", "admin", {}, hours(24)}, &authority),
@@ -166,9 +166,9 @@ TEST_F(Access, BadCertificatesAreRefused) {
         EXPECT_THROW((void)Client(remote("bad", row.identity)).get("/api/v1/status"), ClientError)
             << row.what;
         EXPECT_EQ(source.asked, before) << row.what;
-        if (row.told == nullptr) continue;  // the client refuses by itself
-        EXPECT_TRUE(told("a connection | somebody, from 127.0.0.1 | ")) << row.what;
-        EXPECT_TRUE(told(row.told)) << row.what;
+        if (row.logged == nullptr) continue;  // the client refuses by itself
+        EXPECT_TRUE(logged("a connection | somebody, from 127.0.0.1 | ")) << row.what;
+        EXPECT_TRUE(logged(row.logged)) << row.what;
     }
     // none at all, and no TLS at all
     EXPECT_THROW((void)Client({"", without_scheme(server->remote_address()), ""}), ClientError);
@@ -212,10 +212,10 @@ TEST_F(Access, RevokedCertificatesAreRefusedAtOnce) {
     EXPECT_EQ(of_ada.get("/healthz").status, 200);
     EXPECT_EQ(of_ada.post("/api/v1/commands", body_for("pause")).status, 200);
     EXPECT_EQ(source.requests().size(), 1u);
-    // a list that cannot be read changes nothing and is told
+    // a list that cannot be read changes nothing and is logged
     list("no list");
-    EXPECT_TRUE(told("list of revoked certificates"));
-    EXPECT_TRUE(told("a connection | somebody, from 127.0.0.1 | certificate revoked"));
+    EXPECT_TRUE(logged("list of revoked certificates"));
+    EXPECT_TRUE(logged("a connection | somebody, from 127.0.0.1 | certificate revoked"));
     EXPECT_THROW((void)Client(remote("eve", eve)).get("/healthz"), ClientError);
     EXPECT_EQ(Client(remote("ada", ada)).get("/healthz").status, 200);
 }
@@ -245,7 +245,7 @@ TEST_F(Access, OfAnExpiredCertificateAnAbortIsTakenAndNothingElse) {
     ASSERT_EQ(source.requests().size(), 1u);
     const std::string by = source.requests().front().by;
     EXPECT_EQ(by.rfind("Ada (certificate ada, operator, expired 20", 0), 0u) << by;
-    EXPECT_NE(source.told_of().find("an abort is taken from an expired certificate"),
+    EXPECT_NE(source.logged().find("an abort is taken from an expired certificate"),
               std::string::npos);
     // One who never could, cannot now; a revoked one is nobody.
     EXPECT_EQ(Client(remote("wall", expired("wall", "viewer")))
@@ -270,11 +270,11 @@ TEST_F(Access, AnAbortGetsThroughWhenTheAuthorityAndTheServerHaveExpired) {
     EXPECT_EQ(Client(ada).post("/api/v1/commands", body_for("abort")).status, 200);
     EXPECT_EQ(Client(ada).post("/api/v1/commands", body_for("arm")).status, 403);
     EXPECT_EQ(source.requests().size(), 1u);
-    // and it is told
-    for (int i = 0; i < 500 && source.told_of().find("authority") == std::string::npos; ++i)
+    // and it is logged
+    for (int i = 0; i < 500 && source.logged().find("authority") == std::string::npos; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_NE(source.told_of().find("certificate of the server has expired"), std::string::npos);
-    EXPECT_NE(source.told_of().find("certificate of the authority has expired"), std::string::npos);
+    EXPECT_NE(source.logged().find("certificate of the server has expired"), std::string::npos);
+    EXPECT_NE(source.logged().find("certificate of the authority has expired"), std::string::npos);
 }
 
 TEST_F(Access, AConnectionLivesNoLongerThanItsCertificate) {
@@ -373,11 +373,11 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
     EXPECT_EQ(status_of(ask("/", page, "Host: evil.example\r\n")), 400);
     EXPECT_EQ(status_of(ask("/", page, origin + "Origin: http://evil.example\r\n")), 400);
     EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + origin + origin)), 400);
-    // and who tried it is told of
-    EXPECT_TRUE(told("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found it twice"));
-    EXPECT_TRUE(told("GET '/' | page, from 127.0.0.1 | Host: found 'evil.example" + port));
-    EXPECT_TRUE(told("GET '/api/v1/status' | page, from 127.0.0.1 | Origin: found 'null'"));
-    EXPECT_TRUE(told("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found 'http://evil"));
+    // and who tried it is logged
+    EXPECT_TRUE(logged("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found it twice"));
+    EXPECT_TRUE(logged("GET '/' | page, from 127.0.0.1 | Host: found 'evil.example" + port));
+    EXPECT_TRUE(logged("GET '/api/v1/status' | page, from 127.0.0.1 | Origin: found 'null'"));
+    EXPECT_TRUE(logged("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found 'http://evil"));
     for (const char* wrong : {"rate_hz=x", "rate_hz=21", "after=-1", "after=x", "status=maybe"})
         EXPECT_EQ(status_of(ask(std::string("/api/v1/stream?") + wrong, page, upgrade)), 400)
             << wrong;
@@ -402,10 +402,10 @@ TEST_F(Access, WhoHoldsConnectionsOpenDoesNotLockOutTheStop) {
     EXPECT_EQ(status_of(post(settings.socket, "/api/v1/commands", body_for("abort"))), 200);
     EXPECT_EQ(status_of(get(settings.status_socket, "/api/v1/status")), 200);
     EXPECT_EQ(source.requests().size(), 4u);
-    // and the full door alone is told of, once
+    // and the full door alone is logged, once
     EXPECT_NE(RawConnection(page).until_closed().find("all 64 connections of the page are taken"),
               std::string::npos);
-    EXPECT_TRUE(told("64 wait to show a certificate"));
+    EXPECT_TRUE(logged("64 wait to show a certificate"));
     const auto refusals = source.refusals();
     EXPECT_EQ(std::count_if(refusals.begin(), refusals.end(),
                             [](const std::string& text) {
@@ -415,7 +415,7 @@ TEST_F(Access, WhoHoldsConnectionsOpenDoesNotLockOutTheStop) {
     EXPECT_EQ(refusals.size(), 2u);
 }
 
-TEST_F(Access, WhoFindsNoPlaceIsToldSoOverTlsToo) {
+TEST_F(Access, WhoFindsNoPlaceLearnsSoOverTlsToo) {
     settings.limits.connections = 2;
     server.emplace(source, settings);
     server->answer();
@@ -463,7 +463,7 @@ TEST_F(Access, NobodyUsesUpAnothersCommands) {
                      std::to_string(body.size()) + "\r\n\r\n" + body);
         ASSERT_EQ(status_of(browser.answer()), 403) << i;
     }
-    // THEN it is told of, but does not drown the events
+    // THEN it is logged, but does not drown the events
     EXPECT_GE(source.refusals().size(), 10u);
     EXPECT_LE(source.refusals().size(), 50u);
     Client local(settings.socket);
@@ -471,7 +471,7 @@ TEST_F(Access, NobodyUsesUpAnothersCommands) {
     for (int i = 0; i < 2000 && status != 429; ++i)
         status = local.post("/api/v1/commands", body_for("pause")).status;
     EXPECT_EQ(status, 429);
-    EXPECT_TRUE(told("pause by Ada | uid " + std::to_string(::getuid()) + " | more than 10"));
+    EXPECT_TRUE(logged("pause by Ada | uid " + std::to_string(::getuid()) + " | more than 10"));
     // WHEN another operator commands THEN nothing of that is hers
     EXPECT_EQ(Client(remote("ada", person("operator"))).post("/api/v1/commands", body).status, 200);
 }

@@ -39,8 +39,8 @@ class Door : public testing::Test {
             return std::filesystem::is_socket(path) && status_of(get(path, "/healthz")) == 200;
         });
     }
-    [[nodiscard]] std::size_t times_told(const std::string& words) const {
-        const std::string all = source.told_of();
+    [[nodiscard]] std::size_t times_logged(const std::string& words) const {
+        const std::string all = source.logged();
         std::size_t n = 0;
         for (std::size_t at = all.find(words); at != std::string::npos;
              at = all.find(words, at + 1))
@@ -60,10 +60,10 @@ TEST_F(Door, IsMadeAnewWhenItsSocketIsRemoved) {
         std::filesystem::remove(path);
         EXPECT_TRUE(answers(path)) << path;
     }
-    EXPECT_EQ(times_told("alarm: control socket " + settings.socket + " was removed: made anew"),
+    EXPECT_EQ(times_logged("alarm: control socket " + settings.socket + " was removed: made anew"),
               1u)
-        << source.told_of();
-    EXPECT_EQ(times_told("alarm: status socket"), 1u) << source.told_of();
+        << source.logged();
+    EXPECT_EQ(times_logged("alarm: status socket"), 1u) << source.logged();
     // Who was inside stays inside.
     before.send("GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n");
     EXPECT_EQ(status_of(before.answer()), 200);
@@ -92,9 +92,9 @@ TEST_F(Door, LeavesTheLivingAloneAndComesBackAfterThem) {
     std::filesystem::remove(settings.socket);
     {
         const SocketFile other(settings.socket);
-        EXPECT_TRUE(soon([&] { return times_told("another vibrigd answers") == 1; }));
+        EXPECT_TRUE(soon([&] { return times_logged("another vibrigd answers") == 1; }));
         std::this_thread::sleep_for(1200ms);
-        EXPECT_EQ(times_told("another vibrigd answers"), 1u) << "it is told once";
+        EXPECT_EQ(times_logged("another vibrigd answers"), 1u) << "it is logged once";
         const auto doors = source.server().doors;
         EXPECT_FALSE(doors[0].open);
         EXPECT_NE(doors[0].note.find("another vibrigd"), std::string::npos);
@@ -104,7 +104,7 @@ TEST_F(Door, LeavesTheLivingAloneAndComesBackAfterThem) {
 
 TEST_F(Door, StaysAsItIsWhileNothingIsWrong) {
     std::this_thread::sleep_for(2500ms);
-    EXPECT_EQ(source.told_of(), "");
+    EXPECT_EQ(source.logged(), "");
     EXPECT_EQ(source.server().doors[0].made_anew, 0u);
 }
 

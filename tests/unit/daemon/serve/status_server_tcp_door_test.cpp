@@ -35,7 +35,7 @@ sockaddr_in loopback(std::uint16_t port) {
     return address;
 }
 
-/// No longer listens; its owner is not told.
+/// No longer listens; its owner is not notified.
 void shut(std::uint16_t port) {
     for (int fd = 3; fd < 1024; ++fd) {
         int listens = 0;
@@ -82,8 +82,8 @@ class TcpDoor : public testing::Test {
     static std::uint16_t port_of(const std::string& host) {
         return static_cast<std::uint16_t>(std::stoi(host.substr(host.rfind(':') + 1)));
     }
-    [[nodiscard]] bool told(const std::string& words) const {
-        return before_long([&] { return source.told_of().find(words) != std::string::npos; });
+    [[nodiscard]] bool logged(const std::string& words) const {
+        return before_long([&] { return source.logged().find(words) != std::string::npos; });
     }
     [[nodiscard]] ServerStatus::Door door(const std::string& name) const {
         for (const auto& one : source.server().doors)
@@ -107,9 +107,9 @@ TEST_F(TcpDoor, IsMadeAnewWhenItNoLongerListens) {
     before.send(request());
     ASSERT_EQ(status_of(before.answer()), 200) << "or it might go with the queue";
     shut(port_of(page));
-    EXPECT_TRUE(told("alarm: page door http://" + page + "/ takes no connection"));
-    EXPECT_TRUE(told("made anew"));
-    EXPECT_TRUE(told("page door http://" + page + "/ takes connections again"));
+    EXPECT_TRUE(logged("alarm: page door http://" + page + "/ takes no connection"));
+    EXPECT_TRUE(logged("made anew"));
+    EXPECT_TRUE(logged("page door http://" + page + "/ takes connections again"));
     const RawConnection after(page);
     after.send(request());
     EXPECT_EQ(status_of(after.answer()), 200);
@@ -119,7 +119,7 @@ TEST_F(TcpDoor, IsMadeAnewWhenItNoLongerListens) {
     EXPECT_TRUE(before_long([&] { return door("page").open && door("page").made_anew == 1; }));
     // AND so is the one with certificates
     shut(port_of(remote));
-    EXPECT_TRUE(told("remote door https://" + remote + "/ takes connections again"));
+    EXPECT_TRUE(logged("remote door https://" + remote + "/ takes connections again"));
     Client client({"", remote, folder.file("viewer")});
     EXPECT_EQ(client.get("/healthz").status, 200);
     EXPECT_TRUE(source.refusals().empty()) << "its own connections are nobody's handshake";
@@ -134,19 +134,19 @@ TEST_F(TcpDoor, SaysOnceWhoStandsInItAndComesBackAfterThem) {
     const sockaddr_in address = loopback(port);
     ASSERT_EQ(::bind(other, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     ASSERT_EQ(::listen(other, 64), 0);
-    EXPECT_TRUE(told("leads elsewhere"));
-    EXPECT_TRUE(told("and cannot be made anew"));
+    EXPECT_TRUE(logged("leads elsewhere"));
+    EXPECT_TRUE(logged("and cannot be made anew"));
     EXPECT_TRUE(before_long([&] { return !door("page").open && !door("page").note.empty(); }));
-    const std::string then = source.told_of();
+    const std::string then = source.logged();
     std::this_thread::sleep_for(2500ms);
-    EXPECT_EQ(source.told_of(), then) << "it is told once";
+    EXPECT_EQ(source.logged(), then) << "it is logged once";
     ::close(other);
-    EXPECT_TRUE(told("takes connections again"));
+    EXPECT_TRUE(logged("takes connections again"));
 }
 
 TEST_F(TcpDoor, StaysAsItIsWhileNothingIsWrong) {
     std::this_thread::sleep_for(3500ms);
-    EXPECT_EQ(source.told_of(), "");
+    EXPECT_EQ(source.logged(), "");
     EXPECT_TRUE(source.refusals().empty());
     EXPECT_EQ(door("page").made_anew + door("remote").made_anew, 0u);
 }
