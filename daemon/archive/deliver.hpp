@@ -29,7 +29,7 @@ using Progress = std::function<void(std::size_t done, std::size_t all)>;  ///< b
 [[nodiscard]] Delivery deliver(const std::string& campaign_folder, const Place& place,
                                const std::string& rig, const Progress& progress);
 /// Reads the campaigns of an index' own folder that it has no results of; what cannot be read is
-/// told. For an index that a rig's recorder writes.
+/// reported. For an index that a rig's recorder writes.
 void read_results(Index& index, const std::string& folder, const std::string& rig,
                   const std::function<void(const std::string&)>& tell, const Progress& progress);
 /// The folders of campaigns in a folder, or itself if it is one; "RIG/CAMPAIGN" too. By name.

@@ -30,7 +30,7 @@ struct Instrument {
     std::string name, serial, certificate, due;
 };
 
-/// Of one sensor over a campaign, degC.
+/// Temperature of one sensor over a campaign, degC.
 struct Temperature {
     std::string sensor;
     double mean = 0, low = 0, high = 0;

@@ -1,4 +1,4 @@
-// What an index is told.
+// What is written into an index.
 #include <soci/soci.h>
 #include <spdlog/fmt/fmt.h>
 

@@ -12,7 +12,7 @@ inline constexpr const char* kManifestName = "archive.json";
 
 /// Every file of a campaign's folder with its digest, by name. Throws std::runtime_error.
 [[nodiscard]] std::vector<File> list_files(const std::string& folder);
-/// Of the recording itself: what programs write beside it later does not change it.
+/// Hash of the recording itself: what programs write beside it later does not change it.
 [[nodiscard]] std::string campaign_hash(const std::vector<File>& files);
 [[nodiscard]] std::string manifest_json(const Entry& entry);
 /// What a folder's manifest says; empty without one.

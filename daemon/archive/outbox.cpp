@@ -223,12 +223,13 @@ bool Outbox::deliver(const Campaign& campaign) {
     if (good) {
         mark(campaign);
         failed_.erase(campaign.key);
-        if (!std::exchange(told_, "").empty()) event_(Severity::info, "can be delivered to again");
+        if (!std::exchange(reported_, "").empty())
+            event_(Severity::info, "can be delivered to again");
         event_(Severity::info, campaign.key + ": delivered and verified");
         tell_moved(run.out);
     } else {
         ++failed_[campaign.key];
-        if (std::exchange(told_, run.error) != run.error)
+        if (std::exchange(reported_, run.error) != run.error)
             event_(Severity::warning, campaign.key +
                                           " cannot be delivered, it is kept and tried "
                                           "again: " +

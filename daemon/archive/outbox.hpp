@@ -77,7 +77,7 @@ class Outbox {
     const std::string program_;
     const EventSink event_;
     std::map<std::string, int> failed_;  ///< campaigns that could not be delivered, and how often
-    std::string told_;                   ///< why the newest could not
+    std::string reported_;               ///< why the newest could not
     std::atomic<bool> stop_{false};
     mutable std::mutex mutex_;
     std::condition_variable changed_;

@@ -48,7 +48,7 @@ struct Trend {
     bool several_rigs = false;
 };
 
-/// Of one unit's campaigns, by time.
+/// Trend of one unit's campaigns, by time.
 [[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h);
 
 /// Analysis of variance of values with known standard uncertainties in groups: within the groups

@@ -8,7 +8,7 @@
 
 namespace vibrig::archive {
 
-/// Of older campaigns of a type nothing is asked: so many of the newest tell enough.
+/// Older campaigns of a type are not asked for: so many of the newest tell enough.
 inline constexpr std::size_t kNewestOfType = 2000;
 
 /// The campaigns of each unit of a type that say something about others: valid or doubtful, all

@@ -30,7 +30,7 @@ struct Address {
     socklen_t size = 0;
 };
 
-/// An abstract name; one that is too long is cut and told apart by its hash.
+/// An abstract name; one that is too long is cut and distinguished by its hash.
 Address address_of(const std::string& resource) {
     std::string text = "vibrig-rig/" + resource;
     constexpr std::size_t kMost = sizeof(sockaddr_un::sun_path) - 1;

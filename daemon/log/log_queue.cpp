@@ -46,7 +46,7 @@ struct LogQueue::State {
     std::condition_variable changed;
     std::deque<std::string> lines;
     Counts counts;
-    std::uint64_t untold = 0;  ///< dropped since the last line that was written
+    std::uint64_t unreported = 0;  ///< dropped since the last line that was written
     bool writing = false, ending = false;
     Clock::time_point since{};  ///< of the present write
 
@@ -70,7 +70,7 @@ void LogQueue::put(std::string line) {
         // The newest lines say most about why nobody reads them.
         state_->lines.pop_front();
         ++state_->counts.dropped;
-        ++state_->untold;
+        ++state_->unreported;
     }
     state_->lines.push_back(std::move(line));
     state_->changed.notify_all();
@@ -83,7 +83,7 @@ void LogQueue::write_all(const std::shared_ptr<State>& state) {
         if (state->lines.empty()) return;
         std::string line = std::move(state->lines.front());
         state->lines.pop_front();
-        const std::uint64_t lost = std::exchange(state->untold, 0);
+        const std::uint64_t lost = std::exchange(state->unreported, 0);
         state->writing = true;
         state->since = Clock::now();
         lock.unlock();

@@ -29,7 +29,8 @@ struct Found {
 /// learns from it, and says what the filter should use from the next dwell on. Control thread only.
 class NoiseMonitor {
   public:
-    /// Of the coefficients, order of parameter_names(); the covariance 30 x 30, row-major.
+    /// Knowledge of the coefficients, order of parameter_names(); the covariance 30 x 30,
+    /// row-major.
     struct Knowledge {
         std::array<double, estimator::kParameters> coefficients{};
         std::vector<double> covariance;
@@ -79,7 +80,7 @@ class NoiseMonitor {
     struct MeanAngle {
         double value, sigma;  ///< arcsec
     };
-    /// Of the three gyros' fits: the resolvers are of one kind.
+    /// Mean of the three gyros' fits: the resolvers are of one kind.
     [[nodiscard]] MeanAngle mean_angle() const;
     void propose_levels();
     template <typename Words>

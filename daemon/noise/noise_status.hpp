@@ -24,7 +24,7 @@ struct NoiseStatus {
         double tau_s = 0, ratio = 1, limit = 1;  ///< of a step of the mean in standard deviations
         const char* reading = "";
     };
-    /// Of one dwell, those with an alarm too.
+    /// Curve of one dwell, those with an alarm too.
     struct Curve {
         int run = 0, position = 0;
         bool alarm = false;

@@ -26,7 +26,7 @@ struct AdaptiveSettings {
     planning::GimbalLimits limits;   ///< readings
 };
 
-/// Of fewer nobody can tell what the bias did.
+/// From fewer nobody can tell what the bias did.
 inline constexpr std::size_t kFewestDwells = 14;
 
 /// The filter's covariance (30 x 30, row-major) with each standard error as large as u_a, where the

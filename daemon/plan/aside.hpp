@@ -32,7 +32,7 @@ class Aside {
 
     /// Takes the place of whatever was asked before.
     void ask(std::function<Result()> compute) { ask(std::move(compute), false); }
-    /// For somebody who may wait; nobody is told.
+    /// For a caller that may wait; nobody is notified.
     [[nodiscard]] Result compute(std::function<Result()> what) {
         ask(std::move(what), true);
         std::unique_lock lock(mutex_);

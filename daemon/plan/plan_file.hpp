@@ -19,7 +19,7 @@ class PlanFileError : public std::runtime_error {
 struct PlannedRun {
     std::array<double, 3> position_deg{};  ///< gimbal angles: outer, inner, azimuth
     double level_g = 0;                    ///< peak at the platform
-    double table_g = 0;                    ///< peak at the table: what the shaker is told
+    double table_g = 0;                    ///< peak at the table: the shaker's set-point
     std::size_t count = 1;
     double frequency_hz = 0;  ///< 0: the configuration's
     bool verify = false;      ///< role "verify": held out of the fit

@@ -45,7 +45,7 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
                                            [k](const auto& r) { return r.sensor_c[k]; }));
     std::erase_if(temperature.curves, [&](const Curve& c) { return !known(c); });
     if (!temperature.curves.empty())
-        page.figure(temperature.svg(), "As the platform told them; holes: it did not.");
+        page.figure(temperature.svg(), "As the platform reports them; gaps: it did not.");
     Chart shaker{.title = "Shaker: command and read-back",
                  .x = Axis("time, s"),
                  .y = Axis("peak at the table, g")};

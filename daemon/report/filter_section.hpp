@@ -8,7 +8,7 @@ namespace vibrig::report {
 
 void add_convergence(Page& page, const record::Campaign& campaign, const Analysis& a);
 void add_innovations(Page& page, const Analysis& a);
-/// Of the gyros, by what is left of their rates; and what the noise monitor said.
+/// Noise of the gyros, by the residuals of their rates; and what the noise monitor reported.
 void add_noise(Page& page, const record::Campaign& campaign, const Analysis& a);
 
 }  // namespace vibrig::report

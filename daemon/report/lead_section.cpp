@@ -11,14 +11,14 @@ namespace vibrig::report {
 
 namespace {
 
-std::string told_conditions(const record::Campaign& campaign) {
+std::string conditions_text(const record::Campaign& campaign) {
     double least = std::nan(""), greatest = least, command = least;
     for (const auto& row : campaign.conditions) {
         least = std::fmin(least, row.temperature_c);
         greatest = std::fmax(greatest, row.temperature_c);
         command = std::fmax(command, row.command_g);
     }
-    if (std::isnan(least)) return "Conditions: the platform told no temperature.";
+    if (std::isnan(least)) return "Conditions: the platform reported no temperature.";
     return fmt::format(
         "Conditions: platform at {:.2f} to {:.2f} degC{}.", least, greatest,
         command > 0 ? fmt::format(", table shaken with up to {:.2f} g, peak", command) : "");
@@ -29,7 +29,7 @@ std::string told_conditions(const record::Campaign& campaign) {
 void add_lead(Page& page, const record::Campaign& campaign, const record::ReplayResult& replayed) {
     page.section("model", "Model, conditions, what was left out");
     page.paragraph(std::string("Drift of a gyro, deg/h: ") + kDriftModel + ".");
-    page.paragraph(told_conditions(campaign));
+    page.paragraph(conditions_text(campaign));
     std::size_t offered = 0, rejected = 0;
     Rows rows{{"run, position", "samples rejected", "why"}};
     for (const auto& dwell : replayed.dwells) {

@@ -5,7 +5,7 @@
 
 namespace vibrig::report {
 
-/// Of a table. First row: heads.
+/// Rows of a table. First row: heads.
 using Rows = std::vector<std::vector<std::string>>;
 
 /// HTML in the order in which it is written.

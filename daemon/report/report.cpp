@@ -258,16 +258,16 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
                     "configuration.",
                     zero[0], zero[1], zero[2]));
     add_zeros(page, campaign);
-    std::size_t told = 0;
+    std::size_t shown = 0;
     for (const auto& event : campaign.events) {
         if (!event.text.starts_with("level after") &&
             event.text.find("levelling") == std::string::npos &&
             event.text.find("zero") == std::string::npos)
             continue;
         page.paragraph(event.text);
-        ++told;
+        ++shown;
     }
-    if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
+    if (shown == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
 
     add_spectrum(page, campaign);
     add_type(page, campaign);

@@ -15,8 +15,8 @@ struct Earlier {
     Coefficients coefficients;
 };
 
-/// Of a recorded campaign; throws for the campaign that it is to be compared with itself, and
-/// unless both state the unit's serial number or somebody says that it is the `same_unit`.
+/// Figures of a recorded campaign; throws for the campaign that it is to be compared with itself,
+/// and unless both state the unit's serial number or somebody says that it is the `same_unit`.
 [[nodiscard]] Earlier earlier_of(const record::Campaign& earlier, const record::Campaign& now,
                                  bool same_unit);
 

@@ -73,7 +73,7 @@ void add_evidence(Page& page, const SpectrumJson& spectrum) {
     add_flatness(page, spectrum.at("flat"));
     Rows rows{{"gyro", "log odds", "resonance, Hz", "95 %", "damping", "95 %"}};
     for (std::size_t j = 0; j < 3; ++j) {
-        // One, several, or none that is told.
+        // One, several, or none that is known.
         SpectrumJson list = spectrum.at("resonance").at(j);
         if (list.is_object()) list = SpectrumJson::array({list});
         if (!list.is_array() || spectrum.at("model") != "resonance") list = SpectrumJson::array();
@@ -299,7 +299,7 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
         if (spectrum.at("model") != "groups") add_charts(page, spectrum);
         add_profiles(page, frequencies, campaign);
         add_predicted(page, root);
-        std::string limits = "What such a campaign does not tell:";
+        std::string limits = "What such a campaign cannot show:";
         for (const SpectrumJson& one : spectrum.value("not_told", SpectrumJson::array()))
             limits += (limits.ends_with(':') ? " " : "; ") + one.get<std::string>();
         if (!limits.ends_with(':')) page.paragraph(limits + ".");

@@ -5,8 +5,8 @@
 
 namespace vibrig::report {
 
-/// Of a campaign at several frequencies: what the coefficients are over frequency, and what is not
-/// known of that.
+/// Adds, for a campaign at several frequencies: what the coefficients are over frequency, and what
+/// is not known of that.
 void add_spectrum(Page& page, const record::Campaign& campaign);
 
 }  // namespace vibrig::report

@@ -23,7 +23,7 @@ struct CampaignRecord {
     std::string reasons;          ///< codes with commas between, the strongest first
 };
 
-/// Of a task that has failed; cut to a readable length, always UTF-8.
+/// Record of a task that has failed; cut to a readable length, always UTF-8.
 [[nodiscard]] std::string failed_record(std::string why);
 [[nodiscard]] std::string encode(const CampaignRecord& record);
 /// Throws std::runtime_error.

@@ -48,7 +48,8 @@ class CampaignWorker final : public Worker {
     std::unique_ptr<Point> point_;
 };
 
-/// By the daemon's own reader; what it refuses is told with the study's places. Throws StudyError.
+/// By the daemon's own reader; what it refuses is reported with the study's places. Throws
+/// StudyError.
 [[nodiscard]] configuration::Loaded load_settings(const std::vector<Setting>& settings,
                                                   const std::string& file);
 

@@ -37,7 +37,7 @@ struct PartName {
     long pid = 0;
     bool closed = true;
 
-    /// Of an open one: its process was one of this machine and is no more.
+    /// True for an open one whose process was one of this machine and is no more.
     [[nodiscard]] bool abandoned() const;
 };
 /// Parts in `folder`, by name. `others`: what is there and is none.

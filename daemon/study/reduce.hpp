@@ -27,7 +27,7 @@ class CampaignSums {
     [[nodiscard]] nlohmann::ordered_json json() const;
 
   private:
-    /// Of errors against one of the two claims.
+    /// Sums of errors against one of the two claims.
     struct Claim {
         Sum sigma_squares, z_squares;
         std::array<std::uint64_t, kCoverages.size()> within{};

@@ -74,7 +74,7 @@ struct Study {
 
     [[nodiscard]] std::uint64_t points() const;
     [[nodiscard]] std::uint64_t tasks() const { return points() * runs; }
-    /// Of each axis, the place in its values; the first axis changes slowest.
+    /// The place of each axis in its values; the first axis changes slowest.
     [[nodiscard]] std::vector<std::size_t> place_of(std::uint64_t point) const;
 };
 

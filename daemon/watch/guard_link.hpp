@@ -27,7 +27,7 @@ class GuardLink {
     /// The guard's word, if one came within its deadline.
     [[nodiscard]] bool heard() const;
     [[nodiscard]] proto::GuardWord word() const;
-    /// A person has seen this finding; the guard is told with every word from now on.
+    /// A person has seen this finding; the guard gets it with every word from now on.
     void acknowledge(std::uint64_t finding);
     /// What the guard has found and nobody has acknowledged; none if it is not heard.
     [[nodiscard]] proto::GuardCause finding() const;

@@ -57,7 +57,7 @@ levelling::LevellerSettings settings_of(const Options& options);
 /// Throws std::invalid_argument where that many samples would take for ever.
 void check_samples(const char* option, double duration_s, double period_s);
 
-/// Of the start with the largest tilt and drift that the options allow, s.
+/// Settling time of the start with the largest tilt and drift that the options allow, s.
 std::optional<double> declared_within(const Options& options,
                                       const levelling::LevellerSettings& loop);
 

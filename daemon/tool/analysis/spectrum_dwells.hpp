@@ -43,7 +43,7 @@ class DwellKinds {
     [[nodiscard]] const std::optional<std::size_t>& of(std::size_t dwell) const {
         return of_dwell_[dwell];
     }
-    /// Of a dwell under random vibration its profile at the platform.
+    /// Profile at the platform of a dwell under random vibration.
     [[nodiscard]] const estimator::RandomVibration& random(std::size_t dwell) const {
         return random_[dwell];
     }

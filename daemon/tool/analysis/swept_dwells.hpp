@@ -12,8 +12,8 @@ namespace vibrig::tool {
 /// Whether the frequency of a dwell goes through a range; a dwell is not empty.
 [[nodiscard]] bool is_sweep(const std::vector<const proto::RecordingRow*>& dwell) noexcept;
 
-/// Of a dwell that is one. Throws, naming file and line, where the frequency turns round, where the
-/// accelerometers do not show it, and where no block of it can be used.
+/// The sweep of a dwell that is one. Throws, naming file and line, where the frequency turns round,
+/// where the accelerometers do not show it, and where no block of it can be used.
 [[nodiscard]] estimator::spectrum::Sweep sweep_of(
     const estimator::Settings& settings, const std::vector<const proto::RecordingRow*>& dwell,
     const std::string& file);

@@ -12,8 +12,8 @@ namespace {
 
 using namespace estimator::uncertainty;
 
-/// Parts told of each coefficient, and pieces of advice.
-constexpr std::size_t kPartsTold = 3, kAdviceTold = 3;
+/// Parts shown of each coefficient, and pieces of advice.
+constexpr std::size_t kPartsShown = 3, kAdviceShown = 3;
 
 /// Elements of one input together.
 std::vector<Contribution> joined_parts(const std::vector<Contribution>& parts) {
@@ -44,7 +44,7 @@ std::string of_all(const Assessment& assessed) {
         }
         std::string parts;
         for (const Contribution& part : joined_parts(c.budget)) {
-            if (std::count(parts.begin(), parts.end(), ';') + 1 > static_cast<long>(kPartsTold))
+            if (std::count(parts.begin(), parts.end(), ';') + 1 > static_cast<long>(kPartsShown))
                 break;
             parts += part.input + (part.declared ? " " : " (not declared) ") +
                      line("%.2g;", part.contribution);
@@ -72,10 +72,10 @@ std::string of_one(const Assessment& assessed, std::size_t i) {
 
 std::string advices(const Assessment& assessed) {
     std::string text;
-    std::size_t told = 0;
+    std::size_t shown = 0;
     for (const Leverage& of : leverages(assessed)) {
-        if (told == kAdviceTold || of.without[of.strongest()] > 0.98) break;
-        text += (told++ == 0 ? "what shrinks it most: " : "then: ") + advice(of) + "\n";
+        if (shown == kAdviceShown || of.without[of.strongest()] > 0.98) break;
+        text += (shown++ == 0 ? "what shrinks it most: " : "then: ") + advice(of) + "\n";
     }
     return text;
 }

@@ -24,7 +24,7 @@ inline constexpr std::array kAxisLetters{"x", "y", "z"};
 [[nodiscard]] Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& seen);
 [[nodiscard]] std::string result_table(const zeros::CalibrationResult& r,
                                        const zeros::Observability& seen);
-/// Zeros and misalignments told apart by several calibrations together.
+/// Zeros and misalignments separated by several calibrations together.
 [[nodiscard]] Json apart_json(const zeros::ZerosApart& apart);
 [[nodiscard]] std::string apart_table(const zeros::ZerosApart& apart);
 

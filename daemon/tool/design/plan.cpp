@@ -77,7 +77,7 @@ int run(Options& options) {
         plot::write_pictures(options.plot,
                              {{"sphere", plan_picture(result, frame_of(options.request))}});
     std::cout << (options.json ? plan_json(result) + "\n" : plan_table(result)) << std::flush;
-    if (!std::cout) return 0;  // told by guarded()
+    if (!std::cout) return 0;  // reported by guarded()
     if (!result.refusal.empty()) {
         std::cerr << "refused: " << result.refusal << '\n';
         return kNo;

@@ -31,7 +31,7 @@ Json correlation(const planning::Evaluation& evaluation) {
             {"value", evaluation.correlation}};
 }
 
-/// Motion of the platform in step with the vibration for which its drift is told: what a good
+/// Motion of the platform in step with the vibration for which its drift is given: what a good
 /// platform on isolators has.
 constexpr double kConingArcsec = 2;
 

@@ -125,7 +125,7 @@ struct PlanStudy {
 [[nodiscard]] planning::Vec3 to_readings(const estimator::Settings& rig, const planning::Vec3& at);
 [[nodiscard]] planning::Vec3 to_attitude(const estimator::Settings& rig, const planning::Vec3& at);
 
-/// Of one dwell, by the request or else the configuration.
+/// Times of one dwell, by the request or else the configuration.
 [[nodiscard]] planning::Timing timing_of(const PlanRequest& request,
                                          const configuration::Configuration& c);
 /// Between samples, s.

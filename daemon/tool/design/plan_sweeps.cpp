@@ -46,14 +46,14 @@ PlannedSweeps::PlannedSweeps(const PlanRequest& request, const configuration::Co
     for (const Vec3& position : positions_deg)
         ups.push_back(planning::up_at(c.estimator, position));
     const auto places = spectrum::sweep_places(ups);
-    told_.seen = spectrum::products_seen(ups, places);
+    planned_.seen = spectrum::products_seen(ups, places);
     for (const std::size_t place : places) {
         for (const auto& ends : {std::pair{low, high}, std::pair{high, low}}) {
             PlanRun run;
             run.sweep = {ends.first, ends.second, asked_.sweep_s};
-            run.table_g = told_.table_g;
+            run.table_g = planned_.table_g;
             run.visit = {positions_deg[place],
-                         told_.table_g * mount_.transmission(ends.first).value_or(1)};
+                         planned_.table_g * mount_.transmission(ends.first).value_or(1)};
             runs_.push_back(run);
         }
     }
@@ -87,12 +87,12 @@ void PlannedSweeps::check_range() const {
                                   hz, seen));
     }
     const double octaves_per_minute = 60 * std::log2(high / low) / asked_.sweep_s;
-    if (const auto& told = c_.shaker.registers.sweep;
-        told && std::round(octaves_per_minute / told->rate.scale) < 1)
+    if (const auto& registers = c_.shaker.registers.sweep;
+        registers && std::round(octaves_per_minute / registers->rate.scale) < 1)
         refuse(range +
                    printed(" in %.6g s, %.6g octaves a minute", asked_.sweep_s, octaves_per_minute),
                printed("%.6g at least, the step of shaker.registers.sweep_rate: a shorter sweep",
-                       told->rate.scale));
+                       registers->rate.scale));
     const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
     for (const auto& ends : {std::pair{low, high}, std::pair{high, low}}) {
         const auto usable =
@@ -138,19 +138,19 @@ void PlannedSweeps::choose_level(double level_g) {
             "--sweeps: found %.6g g at the table left by the limits at %.6g Hz, expected %.6g g at "
             "least",
             table_g, tightest_hz, kLeast_g));
-    told_.table_g = table_g;
-    told_.from_hz = ends[0];
-    told_.to_hz = ends[1];
-    told_.seconds = asked_.sweep_s;
-    told_.lowest_g = 1e9;
+    planned_.table_g = table_g;
+    planned_.from_hz = ends[0];
+    planned_.to_hz = ends[1];
+    planned_.seconds = asked_.sweep_s;
+    planned_.lowest_g = 1e9;
     for (const double hz : all) {
         const double there = table_g * mount_.transmission(hz).value_or(1);
-        told_.lowest_g = std::min(told_.lowest_g, there);
-        told_.highest_g = std::max(told_.highest_g, there);
+        planned_.lowest_g = std::min(planned_.lowest_g, there);
+        planned_.highest_g = std::max(planned_.highest_g, there);
     }
     const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
-    told_.up = spectrum::usable_blocks({ends[0], ends[1], asked_.sweep_s}, rate);
-    told_.down = spectrum::usable_blocks({ends[1], ends[0], asked_.sweep_s}, rate);
+    planned_.up = spectrum::usable_blocks({ends[0], ends[1], asked_.sweep_s}, rate);
+    planned_.down = spectrum::usable_blocks({ends[1], ends[0], asked_.sweep_s}, rate);
     if (by_table)
         warnings_.push_back(
             printed("sweeps: the shaker's limits leave %.6g g at the table, at "
@@ -165,7 +165,7 @@ void PlannedSweeps::choose_level(double level_g) {
 void PlannedSweeps::put_before(PlanStudy& study, const planning::Timing& timing) const {
     put_sweeps_before(study, runs_, timing, c_.campaign.swept_by);
     study.warnings.insert(study.warnings.end(), warnings_.begin(), warnings_.end());
-    study.sweeps = told_;
+    study.sweeps = planned_;
 }
 
 void put_sweeps_before(PlanStudy& study, const std::vector<PlanRun>& sweeps,

@@ -30,7 +30,7 @@ class PlannedSweeps {
     const SurveyRequest& asked_;
     const configuration::Configuration& c_;
     const estimator::spectrum::Mount& mount_;
-    Sweeps told_;
+    Sweeps planned_;
     std::vector<PlanRun> runs_;
     std::vector<std::string> warnings_;
 };

@@ -166,14 +166,14 @@ void write_hdf5(const Json& result, const std::string& path) {
 std::string ranges_text(const std::vector<std::pair<std::uint64_t, std::uint64_t>>& ranges,
                         std::uint64_t count) {
     std::string text;
-    std::uint64_t told = 0;
+    std::uint64_t listed = 0;
     for (const auto& [first, last] : ranges) {
         if (&first - &ranges.front().first >= static_cast<std::ptrdiff_t>(2 * kMostRanges)) break;
         text += (text.empty() ? "" : ", ") + std::to_string(first) +
                 (last > first ? " to " + std::to_string(last) : "");
-        told += last - first + 1;
+        listed += last - first + 1;
     }
-    return told < count ? text + " and " + std::to_string(count - told) + " more" : text;
+    return listed < count ? text + " and " + std::to_string(count - listed) + " more" : text;
 }
 
 std::string status_text(const study::StudyStatus& s) {

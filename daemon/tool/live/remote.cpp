@@ -73,7 +73,7 @@ int show_status(const StatusOptions& options) {
         std::cout << reply.body << '\n';
         return 0;
     }
-    // Two looks a moment apart give the rates.
+    // Two queries a moment apart give the rates.
     constexpr auto kBetween = std::chrono::milliseconds(300);
     const v1::Status before = ask_status(client);
     const auto began = Steady::now();
@@ -105,7 +105,7 @@ void show_rows(std::ostream& out,
 void show_signed_record(std::ostream& out, serve::Client& client, const std::string& before) {
     constexpr auto kLook = std::chrono::milliseconds(100);
     constexpr int kLongestLine = 1000;
-    for (int looks = 0; looks < 30; ++looks) {
+    for (int queries = 0; queries < 30; ++queries) {
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
         if (!journal.proof_head().empty() && journal.proof_head() != before) {
@@ -122,10 +122,10 @@ v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::St
                           const std::function<void()>& attend = {}) {
     const std::int64_t before = then.proof().utc_ns();
     constexpr auto kLook = std::chrono::milliseconds(300);
-    constexpr int kLooks = 100;  // after the check, for the proof's last rows
+    constexpr int kQueries = 100;  // after the check, for the proof's last rows
     v1::Status status;
     std::string asked;
-    int looks = 0;
+    int queries = 0;
     do {
         std::this_thread::sleep_for(kLook);
         if (attend) attend();
@@ -136,8 +136,8 @@ v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::St
         }
         const bool over = status.loop_check().verdict() != "running" &&
                           status.campaign().state() != v1::Campaign::checking;
-        if (over && asked.empty()) ++looks;
-    } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
+        if (over && asked.empty()) ++queries;
+    } while (queries == 0 || (status.proof().utc_ns() == before && queries < kQueries));
     if (status.proof().table_g() > 0) show_rows(out, status.loop_check().rows());
     show_rows(out, status.proof().rows());
     if (!status.proof().passed()) out << "not proved: " << status.proof().message() << '\n';
@@ -189,7 +189,7 @@ int self_test(const TestOptions& options) {
 /// refused because of what is only on its way.
 void wait_for_shaker(serve::Client& client) {
     constexpr auto kLook = std::chrono::milliseconds(100);
-    for (int looks = 0; looks < 30; ++looks) {
+    for (int queries = 0; queries < 30; ++queries) {
         const v1::Status status = ask_status(client);
         const auto& shaker = status.shaker();
         if (!shaker.stop_pending() && shaker.fault() == 0) return;
@@ -246,7 +246,7 @@ void add_order(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char
 
 void wait_for_rest(serve::Client& client) {
     constexpr auto kLook = std::chrono::milliseconds(100);
-    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
+    for (int queries = 0; queries < 30 && ask_status(client).shaker().stop_pending(); ++queries)
         std::this_thread::sleep_for(kLook);
 }
 
@@ -290,8 +290,8 @@ std::string default_socket() {
     constexpr const char* kControl = "/run/vibrig/vibrigd.sock";
     constexpr const char* kStatus = "/run/vibrig/status.sock";
     // Who may not command may look.
-    const bool only_looks = access(kControl, W_OK) != 0 && access(kStatus, W_OK) == 0;
-    return only_looks ? kStatus : kControl;
+    const bool reads_only = access(kControl, W_OK) != 0 && access(kStatus, W_OK) == 0;
+    return reads_only ? kStatus : kControl;
 }
 
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
@@ -362,8 +362,8 @@ void add_remote(CLI::App& app, int& exit_code) {
         "1 when that is not valid, or when it was aborted or tripped");
     watching.add_flag("--strict", watch_options.strict,
                       "With --until-finished: a doubtful result is a no as well");
-    add_number(watching, "--interval", watch_options.interval_s, "Time between two looks, s", 0.05,
-               3600)
+    add_number(watching, "--interval", watch_options.interval_s, "Time between two queries, s",
+               0.05, 3600)
         ->capture_default_str();
     watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
 

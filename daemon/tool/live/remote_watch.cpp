@@ -24,7 +24,7 @@ double seconds_since(Steady::time_point start) {
     return std::chrono::duration<double>(Steady::now() - start).count();
 }
 
-/// Sleeps between two looks; signals wake it at once and never elsewhere.
+/// Sleeps between two queries; signals wake it at once and never elsewhere.
 class Pace {
   public:
     Pace() {

@@ -26,11 +26,11 @@ struct Whereabouts {
 };
 /// Throws std::runtime_error with what was found and expected.
 [[nodiscard]] Whereabouts whereabouts_of(const ArchiveOptions& options);
-/// Of whoever asks. What a rig's recorder noted in a folder of recordings, and nobody read the
-/// result of so far, is read first.
+/// Index for whoever asks. What a rig's recorder noted in a folder of recordings, and nobody read
+/// the result of so far, is read first.
 [[nodiscard]] std::unique_ptr<archive::Index> open_index(const ArchiveOptions& options);
 
-/// Of "2026-03-01" or "2026-03-01T08:00:00Z", UTC. Throws std::runtime_error.
+/// Time of "2026-03-01" or "2026-03-01T08:00:00Z", UTC. Throws std::runtime_error.
 [[nodiscard]] std::int64_t utc_of(const std::string& option, const std::string& text);
 /// "2026-03-01 08:00"
 [[nodiscard]] std::string minute_text(std::int64_t utc_ns);

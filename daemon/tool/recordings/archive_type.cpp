@@ -65,7 +65,7 @@ void add_archive_type(CLI::App& group, int& exit_code) {
     command.add_option("TYPE", options.type, "as unit.type says it")->required();
     command.add_option("--without", options.without,
                        "leave out the unit with this serial number, of which something is to be "
-                       "foretold");
+                       "predicted");
     command.add_flag("--simulated", options.simulated,
                      "of campaigns on simulated rigs (default: on real ones)");
     command.add_flag("--json", options.json, "print it as JSON, with covariances");

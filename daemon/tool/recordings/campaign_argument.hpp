@@ -12,7 +12,7 @@ inline constexpr const char* kCampaignHelp =
 
 /// The path that CAMPAIGN means; throws std::runtime_error.
 [[nodiscard]] std::string named_campaign(const std::string& argument);
-/// Reads all its parts. What the index says of its files is told on standard error; throws, too, if
+/// Reads all its parts. What the index says of its files goes to standard error; throws, too, if
 /// one is missing.
 [[nodiscard]] record::Campaign read_named_campaign(const std::string& argument);
 

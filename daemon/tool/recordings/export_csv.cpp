@@ -99,7 +99,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
     std::size_t left_out = 0;
     DwellColumns columns(campaign);
     const auto dwells = record::recorded_dwells(campaign);
-    // One clock where all of them are on it: how long a bias walked is told, too.
+    // One clock where all of them are on it: how long a bias walked is stated, too.
     const bool common_clock = std::ranges::all_of(
         dwells, [](const auto& dwell) { return std::isfinite(dwell.order->begin_s); });
     for (const auto& dwell : dwells) {
@@ -128,11 +128,11 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
     proto::write_recording(path, rows, campaign.head.simulated, columns.profiles());
     std::cerr << path << ": " << rows.size() << " samples of " << dwells.size() << " dwells";
     if (left_out > 0) std::cerr << "; " << left_out << " without good quality are left out";
-    const auto told = std::ranges::count_if(campaign.orders, [](const record::Order& order) {
+    const auto reported = std::ranges::count_if(campaign.orders, [](const record::Order& order) {
         return order.played && order.played->word == estimator::PlayedRandom::Word::good;
     });
-    if (told > 0)
-        std::cerr << "; of " << told
+    if (reported > 0)
+        std::cerr << "; of " << reported
                   << " random dwells the controller's PSD is not in it: their profiles' stand";
     std::cerr << '\n';
 }

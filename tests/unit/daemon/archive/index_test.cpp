@@ -111,7 +111,7 @@ TEST_F(ArchiveIndex, RefusesANewerVersionByName) {
     }
 }
 
-TEST_F(ArchiveIndex, GivesBackWhatItWasTold) {
+TEST_F(ArchiveIndex, GivesBackWhatItWasGiven) {
     Entry one = entry_of("17", 1, -1.25e-7, 3e-9);
     one.coefficients[4].reset();
     one.covariance.assign(465, 0.5);

@@ -55,7 +55,7 @@ struct Holder {
     }};
 };
 
-TEST(RigLock, TheSecondOnTheSameBusIsToldWhoTheFirstIs) {
+TEST(RigLock, TheSecondOnTheSameBusLearnsWhoTheFirstIs) {
     const Holder first(rig("can", 502));
     EXPECT_THAT(refusal_of(rig("can", 503)),
                 AllOf(HasSubstr("can:can" + std::to_string(::getpid())),

@@ -93,7 +93,7 @@ TEST(LogQueue, EndsAlthoughNobodyReads) {
     {
         LogQueue queue(pipe.ends[1], 10);
         for (int i = 0; i < 100; ++i) queue.put(std::string(1000, '.') + '\n');
-        EXPECT_FALSE(queue.end(50ms)) << "it is told that not all is written";
+        EXPECT_FALSE(queue.end(50ms)) << "it reports that not all is written";
         EXPECT_LE(queue.counts().waiting, 1u) << "the line that the pipe has half of";
         expect_balance(queue.counts());
     }

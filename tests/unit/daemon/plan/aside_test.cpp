@@ -22,29 +22,29 @@ std::optional<int> result_of(Aside<int>& aside) {
 }
 
 TEST(Aside, GivesItsResultOnceAndTellsThatItIsThere) {
-    std::atomic<int> told{0};
-    Aside<int> aside([&] { ++told; });
+    std::atomic<int> notified{0};
+    Aside<int> aside([&] { ++notified; });
     EXPECT_FALSE(aside.asked());
     aside.ask([] { return 7; });
     EXPECT_EQ(result_of(aside), 7);
     EXPECT_FALSE(aside.asked());
     EXPECT_FALSE(aside.take());
-    for (int n = 0; n < 60'000 && told.load() == 0; ++n) std::this_thread::sleep_for(1ms);
-    EXPECT_EQ(told.load(), 1);
+    for (int n = 0; n < 60'000 && notified.load() == 0; ++n) std::this_thread::sleep_for(1ms);
+    EXPECT_EQ(notified.load(), 1);
 }
 
-TEST(Aside, WhoMayWaitHasTheResultAtOnceAndNobodyIsTold) {
-    std::atomic<int> told{0};
-    Aside<int> aside([&] { ++told; });
+TEST(Aside, WhoMayWaitHasTheResultAtOnceAndNobodyIsNotified) {
+    std::atomic<int> notified{0};
+    Aside<int> aside([&] { ++notified; });
     for (int n = 0; n < 100; ++n) EXPECT_EQ(aside.compute([n] { return n; }), n);
     EXPECT_FALSE(aside.asked());
     EXPECT_FALSE(aside.take());
-    EXPECT_EQ(told.load(), 0);
-    // and whoever may not wait is told again
+    EXPECT_EQ(notified.load(), 0);
+    // and whoever may not wait is notified again
     aside.ask([] { return 7; });
     EXPECT_EQ(result_of(aside), 7);
-    for (int n = 0; n < 60'000 && told.load() == 0; ++n) std::this_thread::sleep_for(1ms);
-    EXPECT_EQ(told.load(), 1);
+    for (int n = 0; n < 60'000 && notified.load() == 0; ++n) std::this_thread::sleep_for(1ms);
+    EXPECT_EQ(notified.load(), 1);
 }
 
 TEST(Aside, NobodyWaitsForAComputationThatIsAbandoned) {

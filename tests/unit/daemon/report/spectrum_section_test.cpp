@@ -28,10 +28,10 @@ SectionJson result() {
         for (int k = 0; k < 16; ++k) p.back().push_back(i == k ? 1e-6 : 0);
     }
     const SectionJson hypothesis{{"w", 1}, {"hz", 60}, {"damping", 0.05}, {"x", x}, {"p", p}};
-    const SectionJson told{{"hz", 60},
-                           {"hz_interval", {59, 61}},
-                           {"damping", 0.05},
-                           {"damping_interval", {0.04, 0.06}}};
+    const SectionJson one{{"hz", 60},
+                          {"hz_interval", {59, 61}},
+                          {"damping", 0.05},
+                          {"damping_interval", {0.04, 0.06}}};
     SectionJson frequencies;
     for (const int hz : {15, 85})
         frequencies.push_back(
@@ -53,7 +53,7 @@ SectionJson result() {
               {"frequencies", frequencies},
               {"flat", {{"chi_square", 100}, {"dof", 18}, {"p", 0.0}}},
               {"log_odds", {5, 5, 5}},
-              {"resonance", {told, told, told}},
+              {"resonance", {one, one, one}},
               {"mixture", mixture},
               {"highest_hz", 85},
               {"not_told", {"the first thing", "the second thing"}}}}};
@@ -84,7 +84,7 @@ TEST(SpectrumSection, EachCoefficientHasItsOwnNumbers) {
     }
 }
 
-TEST(SpectrumSection, ChartsOfEachCoefficientAndWhatIsNotTold) {
+TEST(SpectrumSection, ChartsOfEachCoefficientAndWhatIsNotShown) {
     const std::string html = page_of(result());
     std::size_t charts = 0;
     for (auto at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1))
@@ -98,7 +98,7 @@ TEST(SpectrumSection, ChartsOfEachCoefficientAndWhatIsNotTold) {
         << "between them nothing is known";
 }
 
-TEST(SpectrumSection, DwellsHeldOutStandBesideWhatWasForetold) {
+TEST(SpectrumSection, DwellsHeldOutStandBesideWhatWasPredicted) {
     const std::string html = page_of(result());
     EXPECT_THAT(html, HasSubstr("Drift predicted against measured"));
     for (const char* cell : {"2, 5", "55", "1.2500", "-0.5000", "1.0000", "2.5", "-5.0"})
@@ -108,7 +108,7 @@ TEST(SpectrumSection, DwellsHeldOutStandBesideWhatWasForetold) {
     EXPECT_THAT(page_of(earlier), HasSubstr("No dwell was held out"));
 }
 
-TEST(SpectrumSection, OneFrequencyAndSweepsAreToldAsWhatTheyAre) {
+TEST(SpectrumSection, OneFrequencyAndSweepsAreReportedAsWhatTheyAre) {
     SectionJson one = result();
     one["spectrum"]["flat"] = nullptr;
     one["spectrum"]["frequencies"].erase(1);
@@ -129,9 +129,9 @@ TEST(SpectrumSection, OneFrequencyAndSweepsAreToldAsWhatTheyAre) {
 
 TEST(SpectrumSection, TwoResonancesOfAGyroHaveARowEach) {
     SectionJson two = result();
-    SectionJson told = two["spectrum"]["resonance"][1], second = told;
+    SectionJson one = two["spectrum"]["resonance"][1], second = one;
     second["hz"] = 95.5;
-    two["spectrum"]["resonance"][1] = SectionJson::array({told, second});
+    two["spectrum"]["resonance"][1] = SectionJson::array({one, second});
     const std::string html = page_of(two);
     EXPECT_THAT(html, HasSubstr("<td>95.500</td>"));
     std::size_t rows = 0;

@@ -80,10 +80,10 @@ TEST_F(StudyRun, GivesTheSameForAnyThreadsAndShards) {
     const Folder threads = planned("threads");
     options.threads = 3;
     options.chunk_s = 0;
-    std::uint64_t told = 0;
-    options.progress = [&](const RunProgress& p) { told = p.done; };
+    std::uint64_t done = 0;
+    options.progress = [&](const RunProgress& p) { done = p.done; };
     EXPECT_TRUE(run_study(threads, options).complete());
-    EXPECT_EQ(told, 12U);
+    EXPECT_EQ(done, 12U);
     EXPECT_EQ(result(threads), expected);
 
     for (const std::uint64_t of : {3U, 7U}) {

@@ -114,7 +114,7 @@ TEST_F(GuardLinkTest, HearsAFindingUntilAPersonHasSeenIt) {
     EXPECT_TRUE(link_.status().heard);
     EXPECT_EQ(link_.status().note, "");
     EXPECT_EQ(link_.status().table_g, 11);
-    // AND it is over once a person has seen it, which the guard is told
+    // AND it is over once a person has seen it, which reaches the guard
     link_.acknowledge(3);
     EXPECT_TRUE(answered([&] { return word->acknowledged == 3; }));
     EXPECT_EQ(link_.finding(), proto::GuardCause::none);

@@ -93,7 +93,7 @@ TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
     record("--dwell 20 --table-g 9");
     // WHEN the recording is identified
     const Outcome outcome = vibrig("identify rec.csv --json");
-    // THEN it is told before what cannot be determined
+    // THEN it is stated before what cannot be determined
     EXPECT_EQ(outcome.exit_code, 1) << outcome.error;
     EXPECT_THAT(outcome.error, HasSubstr("before the run: these positions and levels do not "
                                          "determine one by one: D_Fx D_IIx"));

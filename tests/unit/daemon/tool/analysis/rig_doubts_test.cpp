@@ -91,7 +91,7 @@ TEST_F(RightKeys, RaiseNoDoubt) {
     EXPECT_THAT(warnings, Not(HasSubstr("do not fit")));
 }
 
-TEST_F(RightKeys, ButTwoGyrosOnOneAxisAreTold) {
+TEST_F(RightKeys, ButTwoGyrosOnOneAxisAreReported) {
     EXPECT_THAT(identify("platform.gyro_y_axes = [\"+x\", \"+y\", \"+z\"]").second,
                 HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too"));
 }

@@ -80,9 +80,9 @@ class Swept : public ::testing::Test {
                 out << line << '\n';
                 continue;
             }
-            std::array<char, 32> told{};
-            std::snprintf(told.data(), told.size(), "%.4f", hz(is));
-            out << line.substr(0, last + 1) << told.data() << '\n';
+            std::array<char, 32> digits{};
+            std::snprintf(digits.data(), digits.size(), "%.4f", hz(is));
+            out << line.substr(0, last + 1) << digits.data() << '\n';
         }
     }
     std::filesystem::path folder_;
@@ -103,8 +103,9 @@ TEST_F(Swept, TellAResonanceBesideDwellsAtOneFrequency) {
     EXPECT_TRUE(spectrum["flat"].is_null()) << "one frequency";
     for (const std::size_t gyro : {0U, 1U}) {
         EXPECT_GT(spectrum["log_odds"][gyro], 4);
-        const auto& told = spectrum["resonance"][gyro];
-        const double hz = told["hz"], low = told["hz_interval"][0], high = told["hz_interval"][1];
+        const auto& resonance = spectrum["resonance"][gyro];
+        const double hz = resonance["hz"], low = resonance["hz_interval"][0],
+                     high = resonance["hz_interval"][1];
         EXPECT_LT(std::abs(hz - 60), 4 * (high - low) / (2 * 1.96)) << hz;
         EXPECT_LT(high - low, 1) << "of 0.2 Hz, 1 sigma, for one sweep in 100 s";
     }

@@ -109,7 +109,7 @@ TEST_F(SurveyCommand, APlanForAProfileReachesItsHighestFrequencyOrSaysSo) {
 }
 
 TEST_F(SurveyCommand, BadInputIsNamed) {
-    const std::map<std::string, std::string> told{
+    const std::map<std::string, std::string> refusals{
         {"plan --frequencies 15,35 --highest 20", "found 20 Hz, expected 35 Hz at least"},
         {"plan --frequencies 15,35 --levels 2,6", "expected one level with --frequencies"},
         {"plan --frequencies 15,35 --runs 25 --mount hard", "--runs: found 25"},
@@ -117,7 +117,7 @@ TEST_F(SurveyCommand, BadInputIsNamed) {
         {"plan --mount hard", "--frequencies, --highest, --profile, --sweeps or --about with it"},
         {"plan --frequencies 15,nan", "expected a finite number"},
         {"plan --frequencies 15,35 --evaluate plan.json", "--evaluate"}};
-    for (const auto& [arguments, words] : told) {
+    for (const auto& [arguments, words] : refusals) {
         EXPECT_EQ(vibrig(arguments), 2) << arguments;
         EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
     }
@@ -243,7 +243,7 @@ TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
     EXPECT_EQ(json[0].level_db, runs[1].level_db);
 }
 
-TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsToldWithLineAndColumn) {
+TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     const std::string head =
         "alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,profile,level_db,"
         "role,sweep_from_hz,sweep_to_hz,sweep_s\n0,0,0,6,15,,,,,,\n";

@@ -168,7 +168,7 @@ TEST_F(SweepsCommand, WrongInputIsOneClearError) {
           content("pads.toml") + "spectrum.transmission = [[14, 0.7], [30, 0.3], [50, 0.1]]\n");
     write("axes.csv",
           "alpha_deg,beta_deg,gamma_deg\n0,0,0\n90,0,0\n180,0,0\n270,0,0\n0,0,90\n90,0,90\n");
-    const std::map<std::string, std::string> told{
+    const std::map<std::string, std::string> refusals{
         {"--sweeps 20,120 --config forty.toml",
          "--sweeps: found 20 to 120 Hz at 40 samples/s: with 68 of 300 s harmonics up to the 5th "
          "are off multiples of the rate"},
@@ -195,7 +195,7 @@ TEST_F(SweepsCommand, WrongInputIsOneClearError) {
         {"--about empty.json --highest 100", "--about"}};
     write("empty.json", "{}");
     write("none.json", "no");
-    for (const auto& [arguments, words] : told) {
+    for (const auto& [arguments, words] : refusals) {
         EXPECT_EQ(vibrig("plan " + arguments), 2) << arguments;
         EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
         EXPECT_LE(std::ranges::count(error, '\n'), 2) << arguments << ": " << error;
