@@ -27,7 +27,7 @@ def start(program, seconds, seed, folder):
     found = os.path.join(folder, name)
     os.mkdir(found)
     log = open(os.path.join(folder, name + ".log"), "w+", encoding="utf-8", errors="replace")
-    # Children: what one input leaks is told at the end; a hang is one of 20 s on a busy machine.
+    # Children: what one input leaks is reported at the end; a hang is one of 20 s on a busy machine.
     run = subprocess.Popen([program, f"-max_total_time={seconds}", f"-seed={seed}", "-timeout=20", "-rss_limit_mb=1500",
                             "-max_len=8192", "-print_final_stats=1", f"-artifact_prefix={KEPT}/{name}-", found,
                             os.path.join(HERE, "corpus", name)], stdin=subprocess.DEVNULL, stdout=log,

@@ -153,7 +153,7 @@ def browsed(checks, lab, folder):
         except urllib.error.HTTPError as error:
             refused.append(error.code)
     checks.equal(refused, [404, 405], "what lies elsewhere is not shown, and nothing can be commanded")
-    checks.equal(server.end(), 0, "it ends when it is told")
+    checks.equal(server.end(), 0, "it ends when it is asked to")
 
 
 def served_remotely(checks, lab, folder, serial="0017"):
@@ -199,7 +199,7 @@ def served_remotely(checks, lab, folder, serial="0017"):
     status, _ = asked(port, pki, "ada", "/", authority=os.path.join(other, "authority.crt"))
     checks.check("SSL" in str(status), "whoever trusts another authority sees that it is not its server", str(status))
     checks.check(server.says("guest"), "who was refused is said", server.text()[-500:])
-    checks.equal(server.end(), 0, "it ends when it is told")
+    checks.equal(server.end(), 0, "it ends when it is asked to")
 
 
 def adaptive_by_type(checks, rig, lab, base, seed):
@@ -414,19 +414,19 @@ def sick_archive(checks, lab, disk, base):
     """A disk that refuses while it is written."""
     disk.set("e")
     run = lab.add(base, "rig-9", environment=disk.environment())
-    checks.check(run.returncode == 2 and "cannot" in run.stderr, "an archive that refuses is told with why", run.stderr)
+    checks.check(run.returncode == 2 and "cannot" in run.stderr, "an archive that refuses is reported with why", run.stderr)
     checks.equal(lab.campaigns("--rig", "rig-9") or [], [], "and shows nothing of it")
     disk.set("-")
     run = lab.add(base, "rig-9", environment=disk.environment())
     checks.check(run.returncode == 0 and not lab.half(), "healthy again it takes it", run.stderr)
 
 
-def until_delivered(lab, folder, rig, told=None):
-    """As the outbox does: again and again. How often it took; `told` gets what came of each attempt."""
-    told = [] if told is None else told
+def until_delivered(lab, folder, rig, delivered=None):
+    """As the outbox does: again and again. How often it took; `delivered` gets what came of each attempt."""
+    delivered = [] if delivered is None else delivered
     for attempt in range(1, 60):
-        told.append(lab.add(folder, rig).returncode == 0)
-        if told[-1]:
+        delivered.append(lab.add(folder, rig).returncode == 0)
+        if delivered[-1]:
             return attempt
         time.sleep(0.2)
     return 0
@@ -441,20 +441,20 @@ def shared(checks, programs, folder, base):
     checks.check(until_delivered(lab, base, "rig-1") == 1 and len(lab.campaigns() or []) == 1, "what could not be registered then is now")
     campaigns = [(base, "rig-1")] + [(clone(base, os.path.join(folder, "many", f"{rig}-{i}"), i + 1, serial=f"{rig}-{i % 2}"), rig)
                  for i in range(8) for rig in ("rig-1", "rig-2")]
-    told = []   # of both rigs
+    delivered = []   # of both rigs
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig, told) for f, rig in mine], [c for c in campaigns if c[1] == rig])
+        rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig, delivered) for f, rig in mine], [c for c in campaigns if c[1] == rig])
                 for rig in ("rig-1", "rig-2")]
 
         def until(come, good):
             """One more attempt that went well, or did not, than `come`; or there are no more."""
-            while told.count(good) <= come and not all(rig.done() for rig in rigs):
+            while delivered.count(good) <= come and not all(rig.done() for rig in rigs):
                 time.sleep(0.02)
 
         for _ in range(3):
-            until(told.count(True), True)
+            until(delivered.count(True), True)
             server.kill()
-            until(told.count(False), False)
+            until(delivered.count(False), False)
             server.start()
         attempts = [n for future in rigs for n in future.result()]
     checks.check(all(attempts) and max(attempts) > 1, "two rigs deliver at once, the server is killed three times under it",

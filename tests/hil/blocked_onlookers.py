@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """The recorder and the status server, each blocked on purpose while the table shakes, on a real vcan0 in virtual time:
-measurement and campaign go on, it is told, what the recorder missed stands in the file as a gap; with rows of the interlock
+measurement and campaign go on, it is reported, what the recorder missed stands in the file as a gap; with rows of the interlock
 table that say abort, the shaker is stopped.
 
 usage: blocked_onlookers.py PROGRAMS
@@ -56,7 +56,7 @@ def measured(checks, what, before, after, seconds):
     checks.equal(after["campaign"]["state"], "recording", f"{what}: the campaign goes on")
 
 
-def told(rig, words):
+def logged(rig, words):
     return [line for line in rig.tool("events").stdout.splitlines() if words in line]
 
 
@@ -79,8 +79,8 @@ def slow_recorder(checks, rig):
     missed = r.number(status["recorder"].get("samples_lost", 0))
     checks.check(0 < missed <= BLOCKED_S * RATE_HZ + 400 - RING_SAMPLES,
                  "recorder free again: it knows what it has missed", status["recorder"])
-    checks.check(len(told(rig, "recording_degraded")) == 2, "it was told once, and that it is over",
-                 told(rig, "recording_degraded"))
+    checks.check(len(logged(rig, "recording_degraded")) == 2, "it was reported once, and that it is over",
+                 logged(rig, "recording_degraded"))
     return missed
 
 
@@ -91,8 +91,8 @@ def slow_server(checks, rig):
         checks.equal(s.shaker_state(rig), RUNNING, "server blocked: the table shakes on")
     after = rig.wait_for(lambda t: not raised(t, "server_stuck"), 10)
     measured(checks, "server blocked", before, after, SERVER_S)
-    checks.check(len(told(rig, "server_stuck")) == 2, "server blocked: it was told once, and that it is over",
-                 told(rig, "server_stuck"))
+    checks.check(len(logged(rig, "server_stuck")) == 2, "server blocked: it was reported once, and that it is over",
+                 logged(rig, "server_stuck"))
 
 
 def gaps_in_file(checks, rig, missed):
@@ -125,7 +125,7 @@ def only_degrades(checks, programs):
             rig.stop()
 
 
-def stops_if_told_to(checks, programs):
+def stops_if_asked_to(checks, programs):
     with tempfile.TemporaryDirectory() as folder:
         rig = m.FaultRig(programs, folder)
         try:
@@ -149,7 +149,7 @@ def main():
     if "--inside" in sys.argv:
         checks = r.Checks()
         only_degrades(checks, programs)
-        stops_if_told_to(checks, programs)
+        stops_if_asked_to(checks, programs)
         checks.note(f"{time.monotonic():.0f} s of virtual time")
         return checks.end()
     return subprocess.run([os.path.join(m.HERE, "run-in-uml"), "-T", "-t", "20000", "--wall", "300", "--",

@@ -126,11 +126,11 @@ class Unknown:
         determinant = sum(matrix[0][i] * (matrix[1][(i + 1) % 3] * matrix[2][(i + 2) % 3] - matrix[1][(i + 2) % 3] * matrix[2][(i + 1) % 3])
                           for i in range(3))
         # The reading grows; the angle counts down when the gimbal turns anticlockwise about an upward axis.
-        told = {**ANSWERS, "travel": "-60 130 -30 30 free", "latitude": site["latitude_deg"], "compass": site["azimuth_deg"] + 7, "drawing": "yes" if determinant > 0 else "no",
+        answers = {**ANSWERS, "travel": "-60 130 -30 30 free", "latitude": site["latitude_deg"], "compass": site["azimuth_deg"] + 7, "drawing": "yes" if determinant > 0 else "no",
                 "anticlockwise": "yes" if (sign[2] < 0) == (upright > 0) else "no", **others}
         path = os.path.join(self.rig.folder, "answers.json")
         with open(path, "w", encoding="utf-8") as file:
-            json.dump(told, file)
+            json.dump(answers, file)
         return path
 
     def commission(self, **others):
@@ -570,7 +570,7 @@ def another_controller(checks, u):
                  "and none of the platform's")
     lacking = rig.tool("commission", "units", "--by", "Ada")   # nobody answers
     checks.check("will run at 0 g, and its watchdog will stop it" in unwrapped(lacking.stdout), "it has to run at 0 g first, as any other", lacking.stdout + lacking.stderr)
-    checks.check(rig.daemon.says("registers is void: identity of the shaker's controller is"), "and it is told", rig.logs())
+    checks.check(rig.daemon.says("registers is void: identity of the shaker's controller is"), "and it is reported", rig.logs())
     rig.order("clear other-device")
     u.restart()
 
@@ -762,20 +762,20 @@ def nothing_is_written(checks, programs, folder):
 
 
 def few_bits(checks, programs, folder):
-    """Angles of fewer than 12 bits by the DBC are told at the first look; 12 are enough."""
+    """Angles of fewer than 12 bits by the DBC are reported at the first look; 12 are enough."""
     u = Unknown(checks, programs, folder, drawn(4))
     dbc = os.path.join(folder, "narrow.dbc")
     with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc"), encoding="utf-8") as file:
         text = file.read()
     try:
-        for bits, told in ((12, False), (11, True)):
+        for bits, reported in ((12, False), (11, True)):
             with open(dbc, "w", encoding="utf-8") as file:
                 file.write(text.replace("SG_ Azimuth : 0|20@1+", f"SG_ Azimuth : 0|{bits}@1+"))
             u.configure(can={"dbc": dbc})
             u.restart()
             run = u.rig.tool("commission", "--by", "Ada", "--answers", u.answers(**{"permit.hold": "no"}), timeout=60)
             line = f"ResolverAzimuth.Azimuth has {bits} bits, 12 at least expected"
-            checks.equal(line in unwrapped(run.stdout), told, f"an angle of {bits} bits is {'told' if told else 'fine'}")
+            checks.equal(line in unwrapped(run.stdout), reported, f"an angle of {bits} bits is {'reported' if reported else 'fine'}")
             checks.check("A  40.0 samples/s, 6 channels, |f| = " in unwrapped(run.stdout), "with the rate of the samples", run.stdout + run.stderr)
     finally:
         u.rig.stop()
@@ -1005,9 +1005,9 @@ def dialogue(checks, programs, folder):
         u.configure(platform={"gyro_y_axes": ["+x", "+y", "+z"], "gyro_z_axes": ["+z", "+y", "+x"]})
         check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)
         u.restart()
-        told = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
-        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and u.rig.daemon.says(each) for each in told),
-                     "gyro axes that are hardly meant are told by --check and at the start", check.stderr + u.rig.logs())
+        warned = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
+        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and u.rig.daemon.says(each) for each in warned),
+                     "gyro axes that are hardly meant are reported by --check and at the start", check.stderr + u.rig.logs())
     finally:
         u.rig.stop()
 

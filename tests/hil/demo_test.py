@@ -87,11 +87,11 @@ def main():
         checks.equal(processes_of(kept), [], "no process is left")
         # What people command comes while the rig's clock stands, so that load does not choose its sample.
         with open(os.path.join(kept, "plant.log"), encoding="utf-8") as file:
-            told = file.read()
-        order = [told.find(f"ok {word}\n") for word in ("hold 200", "go")]
-        stood = told.rfind("ok time 200.000 s", 0, order[1])
-        checks.check(-1 < told.find("ok time 40.000 s") < order[0] < stood < order[1],
-                     "proof and campaign are commanded while the clock stands", told[-2000:])
+            transcript = file.read()
+        order = [transcript.find(f"ok {word}\n") for word in ("hold 200", "go")]
+        stood = transcript.rfind("ok time 200.000 s", 0, order[1])
+        checks.check(-1 < transcript.find("ok time 40.000 s") < order[0] < stood < order[1],
+                     "proof and campaign are commanded while the clock stands", transcript[-2000:])
         wrong = demo("--seed", "many", temporary=folder)
         checks.check(wrong.returncode == 2 and "many" in wrong.stderr, "a bad seed is refused by name", wrong.stderr)
         # WHEN it is interrupted in the middle of a campaign

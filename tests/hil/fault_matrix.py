@@ -364,7 +364,7 @@ def daemon_signal(number):
 
 def one_acknowledgement(checks, rig, name, begin, seconds, undo):
     """The controller latches a fault of its own, too: acknowledged once, it can be armed at once. (A controller that was
-    left alone is told to stop by the daemon's own trip, and so forgets by itself.)"""
+    left alone is ordered to stop by the daemon's own trip, and so forgets by itself.)"""
     shaking, found = rig.shake()
     checks.check(shaking, f"{name}: the table shakes before", found)
     begin(rig)

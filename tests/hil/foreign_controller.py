@@ -21,7 +21,7 @@ CAMPAIGN = {"name": "foreign", "identify": "what-it-can", "positions_deg": [[0, 
             "settle_s": 2.0, "ramp_s": 1.0, "temperature_window_s": 0.0}
 SOON = 40   # the machine may be busy
 WITNESS = ("amplitude_witness", "over_armed_level", "stuck")
-# The lie, told while the table does 5 g, and what trips.
+# The lie, begun while the table does 5 g, and what trips.
 WHILE_SHAKING = [
     (["amplitude_scaled=2"], WITNESS),
     (["unit_rms"], WITNESS),
@@ -60,9 +60,9 @@ class Foreign(r.Rig):
         return self.said()[0]
 
     def table_g(self):
-        """As the rig was last told, and so moves."""
-        told = re.findall(r"ok table ([\d.]+)", self.plant.text())
-        return float(told[-1]) if told else 0.0
+        """As the rig was last commanded, and so moves."""
+        commanded = re.findall(r"ok table ([\d.]+)", self.plant.text())
+        return float(commanded[-1]) if commanded else 0.0
 
     def tell(self, *lines):
         for line in lines:

@@ -277,7 +277,7 @@ def tried(checks, programs, line):
     checks.equal(controller.holding.values, before, f"{name}: and all is as it was")
     limits = [rows.get(f"limit, {each}", {}).get("found", "") for each in ("acceleration_g", "velocity_mps", "displacement_mm")]
     checks.check("does not limit, Vibrig alone does" in limits[0] and limits[1].endswith(f"g is held to {MOST_G}"),
-                 f"{name}: what the controller does not limit is told, and what it does", limits)
+                 f"{name}: what the controller does not limit is reported, and what it does", limits)
 
 
 def not_as_stated(checks, programs):

@@ -65,7 +65,7 @@ class Coils:
 
 
 class Guarded(r.Rig):
-    """A rig with a guard, horn and pager; the pager keeps what it is told."""
+    """A rig with a guard, horn and pager; the pager keeps what it gets."""
 
     def __init__(self, programs, folder, *faults, clock="real"):
         super().__init__(programs, "seqpacket", clock, folder, poll_s=0.1)
@@ -95,8 +95,8 @@ class Guarded(r.Rig):
         if not os.path.exists(self.pages):
             return []
         with open(self.pages, encoding="utf-8") as file:
-            told = [json.loads(line) for line in file.read().splitlines() if line.endswith("}")]
-        return [page["text"] for page in told if page["kind"] == kind and page["source"] == source]
+            pages = [json.loads(line) for line in file.read().splitlines() if line.endswith("}")]
+        return [page["text"] for page in pages if page["kind"] == kind and page["source"] == source]
 
     def measured_g(self):
         with self.modbus() as link:
@@ -178,7 +178,7 @@ def starts(checks, rig, what):
 def finds(checks, rig, what, cause):
     checks.check(wait_until(lambda: cause + ":" in rig.guard.text()), f"{what}: the guard finds {cause}", rig.logs())
     checks.check(wait_until(rig.rests), f"{what}: the guard stops the shaker", f"{rig.measured_g()} g\n{rig.logs()}")
-    checks.check(wait_until(lambda: any(cause in text for text in rig.paged("abort"))), f"{what}: the pager is told",
+    checks.check(wait_until(lambda: any(cause in text for text in rig.paged("abort"))), f"{what}: the pager is called",
                  rig.logs())
     checks.check(wait_until(lambda: rig.coils.on(1)), f"{what}: the lamp is on", rig.coils.writes)
     checks.check("stop_disobeyed" not in rig.guard.text() and not rig.paged("disobeyed"), f"{what}: the stop was obeyed",
@@ -206,7 +206,7 @@ def well(checks, programs, folder):
         checks.check(status["campaign"]["state"] == "recording" and status["guard"]["cause"] == "none",
                      "all is well: the guard finds nothing", f"{r.state_of(status)} {status['guard']}\n{rig.logs()}")
         checks.check(abs(status["guard"]["table_g"] - 5) < 0.6, "all is well: it measures 5 g by itself", status["guard"])
-        # the guard goes while armed: an alarm, and it is told when it is back
+        # the guard goes while armed: an alarm, and it is reported when it is back
         rig.guard.process.kill()
         rig.guard.process.wait()
 
@@ -216,7 +216,7 @@ def well(checks, programs, folder):
         checks.check(status is not None and lost(status) and status["campaign"]["state"] == "recording",
                      "the guard is killed: an alarm, and the campaign goes on", r.state_of(status) + rig.logs())
         checks.check(wait_until(lambda: any("guard_lost" in text for text in rig.paged("alarm", "vibrigd"))),
-                     "the guard is killed: the pager is told by the daemon", rig.logs())
+                     "the guard is killed: the daemon calls the pager", rig.logs())
         rig.start_guard()
         status = rig.wait_for(lambda s: s["guard"].get("heard") and not lost(s), SOON)
         checks.check(status is not None and not lost(status) and status["guard"]["cause"] == "none",
@@ -297,7 +297,7 @@ def by_hand(checks, rig, what, _):
 
 
 class Liar:
-    """A daemon that says what it is told to say, and always that all goes on."""
+    """A daemon that says what it is set to say, and always that all goes on."""
 
     def __init__(self, rig):
         self.link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -342,7 +342,7 @@ def lies(what, flags, level_g, drive_g, cause):
                          f"{what}: the guard hears it, sees the table at rest and reaches the shaker", f"{liar.heard}\n{rig.logs()}")
             rig.drive(drive_g)
             finds(checks, rig, what, cause)
-            checks.check(wait_until(lambda: liar.cause() == cause), f"{what}: the liar is told", liar.heard)
+            checks.check(wait_until(lambda: liar.cause() == cause), f"{what}: the liar gets it", liar.heard)
         finally:
             if liar:
                 liar.end()

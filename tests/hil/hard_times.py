@@ -207,9 +207,9 @@ def held_back(checks, rig, text, name, words, most_g):
     checks.check(not recorded, f"{text}: nothing is recorded, it is refused or trips", f"{state} {said}\n{rig.logs()}")
     tripped = (status or {}).get("interlock", {}).get("tripped", "")
     events = (rig.ask("/api/v1/events?after=0&limit=1000") or {}).get("events", [])   # of this life, which began with it
-    told = " | ".join([f"{tripped}: {state}", *(each.get("detail", "") for each in said if each),
+    verdict = " | ".join([f"{tripped}: {state}", *(each.get("detail", "") for each in said if each),
                        *(event["text"] for event in events if event["severity"] == "trip")])
-    checks.check(re.search(words, told), f"{text}: and it says so", f"expected {words}, found: {told}\n{(status or {}).get('shaker')}")
+    checks.check(re.search(words, verdict), f"{text}: and it says so", f"expected {words}, found: {verdict}\n{(status or {}).get('shaker')}")
     took = lies.seconds_until(lambda: lies.table_g(rig) <= most_g, STOP_S + lies.SLACK_S)
     checks.check(took is not None, f"{text}: the table is at rest within {STOP_S} s", f"{lies.table_g(rig)} g")
 
@@ -328,7 +328,7 @@ def write(path, text):
 
 # ---- the proof against a controller that lies
 
-# Truth, words of which the verdict has one (with ramps as short as these the unit itself is not told from them; of a slow ramp the shaker's own word
+# Truth, words of which the verdict has one (with ramps as short as these the unit itself is not distinguished from them; of a slow ramp the shaker's own word
 # and the accelerometers' come within a sample of each other); whether nothing but the emergency stop ends it.
 PROVED = [
     ("honest", [], (), False),

@@ -231,7 +231,7 @@ def one_rig(programs, folder, name, kills, rng, disk, report):
             kill = Kill(rig, witness, disk, rng)
             try:
                 kill.run()
-            except Exception as error:   # of a thread: it has to be told
+            except Exception as error:   # of a thread: it has to be reported
                 kill.check(False, "runs to its end", repr(error) + "\n" + rig.logs())
             rig.daemon.end()
             report(f"rig {name}, kill {number + 1}, {kill.text}", kill.results)

@@ -37,7 +37,7 @@ class Rig(r.Rig):
         self.configure(CAMPAIGN, unit={"type": "IMU-7", "serial": "0042"}, annunciator={"command": pager})
 
     def paged(self, words, timeout_s=10):
-        """Whether somebody was told of it."""
+        """Whether somebody was notified of it."""
         end, text = time.monotonic() + timeout_s, ""
         while words not in text and time.monotonic() < end:
             with contextlib.suppress(FileNotFoundError), open(os.path.join(self.folder, "paged"), encoding="utf-8") as file:
@@ -169,7 +169,7 @@ def while_shaking(checks, rig):
                  started.stdout + started.stderr)
     again = rig.tool("start", "--by", "Ada")
     checks.check(again.returncode == 1 and "a campaign is running, started by Grace" in again.stderr,
-                 "a second start is told that it runs", again.stderr)
+                 "a second start is refused: it runs", again.stderr)
     status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
     checks.check(status["campaign"]["state"] == "recording", "it shakes", r.state_of(status))
     rig.kill()
@@ -276,7 +276,7 @@ def disk_refuses(checks, rig):
     rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 20)
     said = [answer.stdout for answer in rig.acknowledge()]
     checks.check(len(said) == 2 and all("may have to be said again" in words for words in said),
-                 "who acknowledges it is told that a restart may forget that", str(said))
+                 "who acknowledges it is warned that a restart may forget that", str(said))
     refused = rig.tool("arm", "--by", "Ada")
     checks.check(refused.returncode == 1 and "journal has not written" in refused.stderr,
                  "it is not armed while that cannot be written", refused.stdout + refused.stderr)

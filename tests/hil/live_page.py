@@ -182,9 +182,9 @@ def check_injection(checks, rig, address):
     status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST", body)
     checks.equal(status, 400, "in a key, too")
     rig.wait_for(lambda s: rig.daemon.text().count("refused a command") >= 2, 10)
-    told = [line for line in rig.daemon.text().split("\n") if "refused a command" in line]
-    told += [line for line in rig.tool("events").stdout.split("\n") if "refused a command" in line]
-    checks.check(len(told) >= 4 and all(c.isprintable() for line in told for c in line), "and told of in one clean line", str(told))
+    logged = [line for line in rig.daemon.text().split("\n") if "refused a command" in line]
+    logged += [line for line in rig.tool("events").stdout.split("\n") if "refused a command" in line]
+    checks.check(len(logged) >= 4 and all(c.isprintable() for line in logged for c in line), "and logged in one clean line", str(logged))
     checks.check(not any(line.startswith("2026-01-01") for line in rig.daemon.text().split("\n")), "no line is faked", rig.logs())
 
 

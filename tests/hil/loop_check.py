@@ -33,7 +33,7 @@ def over(status):
 
 
 def make(checks, programs, folder, speed, change=None, campaign=None, tables=None, plant=(), **selftest):
-    """A rig, its truth changed as told, and a daemon that measures."""
+    """A rig, its truth changed as given, and a daemon that measures."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     truth = os.path.join(folder, "truth.json")
     subprocess.run([rig.program("vibrig-plant"), "run", "--write-truth", truth, "--duration", "0", "--clock", "real", "--can",
@@ -102,10 +102,10 @@ def in_band(checks, programs, folder):
         with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
             who = [person.split(" (")[0] for person, in database.execute(
                 "SELECT person FROM command WHERE kind = 'selftest' AND accepted ORDER BY id")]
-            told = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE 'loop check%'")]
+            logged = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE 'loop check%'")]
         checks.equal(who, ["Ada", "Grace"], "the journal knows who ordered it")
-        checks.check("loop check in band" in told and any("transmission" in text for text in told),
-                     "and what came out", told)
+        checks.check("loop check in band" in logged and any("transmission" in text for text in logged),
+                     "and what came out", logged)
     finally:
         rig.stop()
 
@@ -210,8 +210,8 @@ def grown(checks, programs, folder, what, fault=None, row=None, says=()):
                      rig.logs())
         checks.check(rig.daemon.says(f"{row}: over"), f"{what}: over with the dwell", rig.logs())
         with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
-            told = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE '%as at the loop check%'")]
-        checks.check(len(told) == 1 and told[0].startswith("at 25.1 Hz"), f"{what}: the journal has it", told)
+            logged = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE '%as at the loop check%'")]
+        checks.check(len(logged) == 1 and logged[0].startswith("at 25.1 Hz"), f"{what}: the journal has it", logged)
     finally:
         rig.stop()
 

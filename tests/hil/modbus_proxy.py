@@ -1,4 +1,4 @@
-"""Between vibrigd and the shaker's Modbus server: notes every write with its time, and spoils replies as told."""
+"""Between vibrigd and the shaker's Modbus server: notes every write with its time, and spoils replies as set."""
 import select
 import socket
 import struct
@@ -14,7 +14,7 @@ class Proxy:
     """`spoil` is one of None, "refuse", "hang", "freeze" (as a server that is stopped), "reset", "trickle", "transaction",
     "unit", "function", "length", "short", ("exception", N), ("late", seconds), ("measured", factor) of the measured amplitude, ("contact", 1) of the
     emergency stop, which reads open; `times` replies are spoilt, then it is None
-    again (None: until told)."""
+    again (None: until set)."""
 
     def __init__(self, target):
         self.target = target

@@ -134,7 +134,7 @@ def check_birth(checks, host, rig):
     checks.equal(len(metrics), len(birth.metrics), "no name stands twice")
     wrong = [m.name for m in birth.metrics if m.datatype not in VALUES or (not m.is_null and not m.HasField(VALUES[m.datatype]))]
     checks.equal(wrong, [], "values are of the types they are said to be")
-    checks.equal(value_of(metrics["Campaign/Name"]), "fleet", "the campaign's name is told")
+    checks.equal(value_of(metrics["Campaign/Name"]), "fleet", "the campaign's name is published")
     checks.check(value_of(metrics["Coefficients/D_Fx/Value"]) is None, "what is not known is null")
     unit = dict(zip(metrics["Shaker/Command"].properties.keys, metrics["Shaker/Command"].properties.values))
     checks.equal(unit["engUnit"].string_value, "g", "units come along")
@@ -160,7 +160,7 @@ def check_data(checks, host, rig, birth):
     state = next(m.alias for m in birth.metrics if m.name == "Campaign/State")
     checks.check(host.until(lambda: any(m.alias == state and m.string_value == "recording"
                                         for p in host.kind("NDATA")[-20:] for m in p.metrics)),
-                 "its state is told when it changes", rig.logs())
+                 "its state is reported when it changes", rig.logs())
     gone = rig.tool("abort", "--by", "fleet test")
     checks.check(gone.returncode == 0, "it is aborted", gone.stderr)
 
@@ -215,7 +215,7 @@ def check_broker_lost(checks, host, rig, broker, again):
     broker.process.send_signal(signal.SIGCONT)
     broker.end()
     lost = rig.wait_for(lambda s: not s["mqtt"]["connected"], PATIENCE_S)
-    checks.check(not lost["mqtt"]["connected"] and lost["mqtt"]["note"], "a lost broker is told, with the cause", str(lost["mqtt"]))
+    checks.check(not lost["mqtt"]["connected"] and lost["mqtt"]["note"], "a lost broker is reported, with the cause", str(lost["mqtt"]))
     checks.check("DOWN" in rig.tool("status").stdout, "and shown by `vibrig status`")
     metrics = live_page.get(live_page.page_address(rig), "/metrics")[2]
     checks.check("\nvibrig_mqtt_up 0\n" in metrics, "and by the metrics", metrics[-1500:])

@@ -361,7 +361,7 @@ def upgrades(checks, rig, package):
 
 
 def is_removed(checks, rig):
-    # On a busy machine rest may be in doubt for a moment; then dpkg is told, and asked again.
+    # On a busy machine rest may be in doubt for a moment; then dpkg is answered so, and asked again.
     said = []
     checks.check(wait_until(lambda: said.append(output("dpkg", "-r", "vibrig")) or said[-1][0] == 0, 30),
                  "the package is removed", said[-1][1])

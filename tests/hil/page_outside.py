@@ -58,9 +58,9 @@ def check_guard(checks, programs, folder, page):
         rig.drive(5.0)
         until("what the guard finds is shown with its words", shown("/^guard: ./", "bad"))
         found = [li for li in page.ask("evaluate", script=f"{STRIP}.map(li => li.textContent)").get("value", []) if li.startswith("guard: ")]
-        told = rig.status()["guard"]
-        checks.check(found and found[0] == "guard: " + told["text"] and told["cause"] != "none", "they are the guard's own",
-                     f"{found} {told}")
+        guard = rig.status()["guard"]
+        checks.check(found and found[0] == "guard: " + guard["text"] and guard["cause"] != "none", "they are the guard's own",
+                     f"{found} {guard}")
         until("a stop that is not obeyed asks for the emergency stop", "!document.getElementById('next').hidden && "
               "/A STOP IS NOT OBEYED/.test(document.getElementById('next-what').textContent) && "
               "/Press the emergency stop/.test(document.getElementById('next-steps').textContent)")

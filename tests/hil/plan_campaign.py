@@ -187,10 +187,10 @@ def unwritable(checks, programs, folder):
         return subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True,
                               text=True, timeout=30)
     keys = {"remote": "127.0.0.1:0", "certificate": nowhere, "key": nowhere, "clients_ca": nowhere}
-    for server, told in (({**keys, "clients_ca": "gone.crt"}, f'unwritable.toml:5: server.clients_ca: found "{folder}/gone.crt", expected'),
+    for server, expected in (({**keys, "clients_ca": "gone.crt"}, f'unwritable.toml:5: server.clients_ca: found "{folder}/gone.crt", expected'),
                          (keys, f"unwritable.toml:2: server.remote: certificate: found '{nowhere}': expected it in PEM")):
         check = checked(server=server)
-        checks.check(check.returncode == 2 and told in check.stderr, "--check finds certificates that are not there or are none",
+        checks.check(check.returncode == 2 and expected in check.stderr, "--check finds certificates that are not there or are none",
                      check.stderr)
     # A DBC of another rig: all that it does not have in one run, each with the line where it is mended.
     dbc = os.path.join(folder, "another.dbc")
@@ -202,15 +202,15 @@ def unwritable(checks, programs, folder):
         file.write(r.toml({"clock": {"source": "rig"}, "shaker": {"host": "127.0.0.1"},
                            "can": {"port": "seqpacket", "path": os.path.join(folder, "bus.sock"), "dbc": dbc}, **signals}))
     check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True, text=True, timeout=30)
-    told = ['unwritable.toml:8: can.signals.table_accel: found "TableAccelerometer.Axial" (default), expected',
+    expected = ['unwritable.toml:8: can.signals.table_accel: found "TableAccelerometer.Axial" (default), expected',
             'unwritable.toml:8: can.signals.gyros_at_speed: found "PlatformStatus.GyrosAtSpeed" (default), expected',
             'unwritable.toml:10: can.signals.temperature: found "Nobody.T", expected']
-    checks.check(check.returncode == 2 and all(line in check.stderr for line in told),
+    checks.check(check.returncode == 2 and all(line in check.stderr for line in expected),
                  "--check finds all signals that a DBC does not have, each with its line", check.stderr)
     for results in ("/proc/nowhere", "/proc", nowhere, os.path.join(nowhere, "below")):
         check = checked(campaign={"results": results})
-        told = f'unwritable.toml:2: campaign.results: found "{results}", expected a folder that can be written: '
-        checks.check(check.returncode == 2 and told in check.stderr, f"--check finds that results cannot be kept in {results.replace(folder, '...')}",
+        expected = f'unwritable.toml:2: campaign.results: found "{results}", expected a folder that can be written: '
+        checks.check(check.returncode == 2 and expected in check.stderr, f"--check finds that results cannot be kept in {results.replace(folder, '...')}",
                      check.stderr)
 
 

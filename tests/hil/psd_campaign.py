@@ -17,7 +17,7 @@ import rig as r  # noqa: E402
 import survey_campaign  # noqa: E402
 
 BLOCK = {"psd_block": {"address": 16, "pairs": 200}}
-TOLD = {"spectrum": {"controller_psd": "registers"}, "registers": BLOCK}
+REPORTED = {"spectrum": {"controller_psd": "registers"}, "registers": BLOCK}
 # Elastic at 60 Hz: it matters where the power lies. 3 dB more with each octave take half of the profile's power there.
 TRUTH = {**random.TRUTH, "elastic": {"share": [0.5] * 3, "resonance_hz": [60.0] * 3, "damping": [0.05] * 3}}
 TILTED = ("--fault", "profile-tilted=3")
@@ -42,10 +42,10 @@ def same_again(checks, programs, path, result, what):
 def honest(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        count, commands = random.start(rig, random.plan_of(folder, len(random.POSITIONS)), 60.0, *TILTED, truth=TRUTH, **TOLD)
+        count, commands = random.start(rig, random.plan_of(folder, len(random.POSITIONS)), 60.0, *TILTED, truth=TRUTH, **REPORTED)
         last = rig.wait_for_state(random.ENDS, random.WALL_S)
         _, text = rig.result()
-        if not checks.check(last and last["campaign"]["state"] == "finished" and text, "told what is played, it runs to the end",
+        if not checks.check(last and last["campaign"]["state"] == "finished" and text, "with what is played reported, it runs to the end",
                             f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.daemon.text()[-4000:]}"):
             return
         dwells, log = last["campaign"]["dwells"], rig.daemon.text()
@@ -62,14 +62,14 @@ def honest(checks, programs, folder):
     held = [row for row in result["spectrum"]["held_out"] if row["profile"] == "broad"]
     # Six rates; four sigma once in 2600 such tests.
     checks.check(len(held) == len(random.HELD_OUT) and all(abs(z) < 4 for row in held for z in row["z"]),
-                 "what was held out is as foretold", [row["z"] for row in held])
+                 "what was held out is as predicted", [row["z"] for row in held])
 
 
 def resumed(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     sines = 2
     try:
-        count, _ = random.start(rig, random.plan_of(folder, sines), 40.0, "--speed", "20", *TILTED, truth=TRUTH, **TOLD)
+        count, _ = random.start(rig, random.plan_of(folder, sines), 40.0, "--speed", "20", *TILTED, truth=TRUTH, **REPORTED)
         status = rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= sines + 2 and s["campaign"]["state"] == "recording", 120)
         if not checks.check(status is not None and status["campaign"]["state"] == "recording", "killed: in a random dwell",
                             f"{r.state_of(status)}\n{rig.logs()}"):
@@ -92,12 +92,12 @@ def lies(checks, programs, folder, fault, expected, says):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     name = fault.split("=", maxsplit=1)[0].replace("-", "_")
     try:
-        random.start(rig, random.plan_of(folder, 2), 20.0, "--fault", fault, **TOLD)
+        random.start(rig, random.plan_of(folder, 2), 20.0, "--fault", fault, **REPORTED)
         last = rig.wait_for_state(random.ENDS, 240)
         log = rig.daemon.text()
-        told = [d["reason"] for d in (last or {"campaign": {"dwells": []}})["campaign"]["dwells"]][2:]
-        checks.equal(told[:len(expected)], expected, f"{name}: the dwells say so {r.state_of(last)}")
-        checks.check(rig.daemon.says(says), f"{name}: what is wrong is told, and where", log[-3000:])
+        reasons = [d["reason"] for d in (last or {"campaign": {"dwells": []}})["campaign"]["dwells"]][2:]
+        checks.equal(reasons[:len(expected)], expected, f"{name}: the dwells say so {r.state_of(last)}")
+        checks.check(rig.daemon.says(says), f"{name}: what is wrong is reported, and where", log[-3000:])
         checks.check("stop of the shaker" not in log, f"{name}: nothing trips of it", log[-3000:])
     finally:
         rig.stop()

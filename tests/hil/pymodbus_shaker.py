@@ -64,7 +64,7 @@ class Shaker:
         self.inputs = ModbusSequentialDataBlock(0, [0] * 16)
         self.state, self.fault, self.level, self.last_feed, self.fed_at = IDLE, 0, 0.0, 0, time.monotonic()
         self.heard = b""   # of a line that is not whole yet
-        self.feeds, self.lies, self.held, self.told_to_run = 0, dict(lies), 0.0, False
+        self.feeds, self.lies, self.held, self.ordered_to_run = 0, dict(lies), 0.0, False
 
     def word(self, address):
         return self.holding.values[address]
@@ -88,13 +88,13 @@ class Shaker:
             self.holding.values[TIMEOUT] = int(lies["timeout_register"])
         if self.word(FEED) != self.last_feed:
             self.last_feed, self.fed_at, self.feeds = self.word(FEED), now, self.feeds + 1
-        if self.word(RUN) and not self.told_to_run:
+        if self.word(RUN) and not self.ordered_to_run:
             self.fed_at = now
-        ends = self.told_to_run and not self.word(RUN) and not lies.get("ack_without_stop")
-        self.told_to_run = bool(self.word(RUN)) or (self.told_to_run and not ends)
+        ends = self.ordered_to_run and not self.word(RUN) and not lies.get("ack_without_stop")
+        self.ordered_to_run = bool(self.word(RUN)) or (self.ordered_to_run and not ends)
         timeout = self.word(TIMEOUT) * 1e-3 * lies.get("timeout_scaled", 1.0)
-        if (self.level > 0 or self.told_to_run) and 0 < timeout < now - self.fed_at and not lies.get("timeout_ignored"):
-            ends, self.told_to_run, self.fault = True, False, self.fault | 1
+        if (self.level > 0 or self.ordered_to_run) and 0 < timeout < now - self.fed_at and not lies.get("timeout_ignored"):
+            ends, self.ordered_to_run, self.fault = True, False, self.fault | 1
             self.holding.values[RUN] = 0
         if ends and lies.get("stuck_contactor"):
             self.held = max(self.held, self.level)
@@ -103,7 +103,7 @@ class Shaker:
         if self.level == 0 and self.holding.stopped:
             self.fault = 0
         self.holding.stopped = False
-        wanted = self.set_point() if self.told_to_run and not self.fault else 0.0
+        wanted = self.set_point() if self.ordered_to_run and not self.fault else 0.0
         rate = max(self.set_point(), self.level, 0.1) / max(self.word(RAMP) * 1e-2, 0.1) / lies.get("slow_ramp", 1.0)
         if self.level < wanted:
             self.level = min(wanted, self.level + rate * dt)
@@ -111,7 +111,7 @@ class Shaker:
             self.level = max(wanted, self.level - rate * dt)
         if self.fault:
             self.state = FAULT
-        elif self.told_to_run:
+        elif self.ordered_to_run:
             self.state = RUNNING if self.level == wanted else RAMPING
         else:
             self.state = STOPPING if self.level > 0 else IDLE

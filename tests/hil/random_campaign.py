@@ -117,7 +117,7 @@ def honest(checks, programs, folder, dwell_s):
     held = [row for row in (result.get("spectrum") or {}).get("held_out", []) if row["profile"] == "broad"]
     checks.equal([[round(z, 4) for z in row["z"]] for row in held],
                  [[round(z, 4) for z in row["z"]] for row in verification.get("dwells", [])],
-                 "the result has them beside what was foretold")
+                 "the result has them beside what was predicted")
 
 
 def exported(checks, programs, rig, recorded, result):
@@ -174,7 +174,7 @@ def resumed(checks, programs, folder):
     held = [row for row in (result.get("spectrum") or {}).get("held_out", []) if row["profile"] == "broad"]
     checks.equal(len(held), len(HELD_OUT), "and so did those held out")
     # Six rates; four sigma once in 2600 such tests.
-    checks.check(all(abs(z) < 4 for row in held for z in row["z"]), "they are as foretold", [row["z"] for row in held])
+    checks.check(all(abs(z) < 4 for row in held for z in row["z"]), "they are as predicted", [row["z"] for row in held])
 
 
 def through(hz, ratio_at_15, damping=0.2):
@@ -234,7 +234,7 @@ def lies(checks, programs, folder, fault, trips, says):
         checks.check(last and last["campaign"]["state"] == "tripped" and any(trip in log or rig.daemon.says(trip) for trip in trips),
                      f"{name}: the daemon trips", f"{r.state_of(last)}\n{log[-3000:]}")
         checks.equal(len(taken), 1, f"{name}: not a sample is taken under it")
-        checks.check(rig.daemon.says(says), f"{name}: what is wrong is told", log[-3000:])
+        checks.check(rig.daemon.says(says), f"{name}: what is wrong is reported", log[-3000:])
     finally:
         rig.stop()
 

@@ -1,4 +1,4 @@
-"""Rows of the fault matrix for a table that shakes at random: what is lost, broken or told otherwise under a profile has to end as
+"""Rows of the fault matrix for a table that shakes at random: what is lost, broken or reported otherwise under a profile has to end as
 it does under a sine, and what only a random control can do wrong has a name of its own."""
 import json
 import os

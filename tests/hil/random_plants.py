@@ -136,15 +136,15 @@ def answers_of(truth, start, folder):
     ends = sorted((math.remainder(end - at, 360) * sign[0] for end in (90, -90)),
                   key=lambda t: abs(t) + 1e3 * abs(t - min(max(t, lowest), highest)))
     upright = at + sign[0] * ends[0]
-    told = {"power": "yes", "permit.hold": "yes", "permit.torque": "yes", "names": "torquers", "travel": "-60 130 -30 30 free",
+    answers = {"power": "yes", "permit.hold": "yes", "permit.torque": "yes", "names": "torquers", "travel": "-60 130 -30 30 free",
             "latitude": site["latitude_deg"], "compass": site["azimuth_deg"] + 7,
             "drawing": "yes" if determinant_of(truth["accelerometer"]["matrix"]) > 0 else "no",
             "anticlockwise": "yes" if (sign[2] < 0) == (math.sin(math.radians(upright)) > 0) else "no"}
     for slot, name in enumerate(platform["channel"]):
-        told["permit." + GIMBALS[slot]], told["which." + GIMBALS[slot]] = "yes", name
+        answers["permit." + GIMBALS[slot]], answers["which." + GIMBALS[slot]] = "yes", name
     path = os.path.join(folder, "answers.json")
     with open(path, "w", encoding="utf-8") as file:
-        json.dump(told, file)
+        json.dump(answers, file)
     return path
 
 

@@ -92,7 +92,7 @@ def killed(checks, rig):
     checks.check(subprocess.run(["h5dump", "-H", path], capture_output=True).returncode == 0, "h5dump opens it then")
     with h5py().File(path, "r") as file:
         checks.equal(file["samples/time_ns"].shape[0], found["samples"] + found["samples_from_raw"],
-                     "every sample that is told of is there")
+                     "every sample that is reported is there")
         checks.check(file.attrs["state"] == b"recovered" or file.attrs["state"] == "recovered", "its state says so")
     again = offline(rig, "replay", folders(rig)[-1])
     checks.check("as recorded, to the last bit" in again.stderr, "what was done replays to the last bit", again.stderr)
@@ -227,7 +227,7 @@ def complete(checks, rig):
     checks.check("shaker controller S-1: certificate C-77 was due on 2020-01-31" in said and "resolver box" not in said,
                  "an overdue instrument is an event when somebody arms", said)
     checks.check("shaker controller S-1: certificate C-77 was due on 2020-01-31" in armed and "resolver box" not in armed,
-                 "and told to whoever arms", armed)
+                 "and shown to whoever arms", armed)
     status = rig.wait_for_state(("finished",), 120)
     checks.equal(r.state_of(status), "finished", "a campaign finishes")
     status = rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
@@ -322,10 +322,10 @@ def exports(checks, rig, folder, path):
     exported = offline(rig, "export", folder, "--to", "csv", "-o", "x.csv")
     both.append(offline(rig, "identify", "x.csv", "--json"))
     direct, from_csv = (json.loads(run.stdout or "{}") for run in both)
-    told = [run.stderr.splitlines() for run in both]
-    checks.check(told[0] == told[1] and told[0][:1] and
-                 told[0][0].startswith("before the run: these positions and levels do not determine one by one: D_"),
-                 "of both it is told before what three positions cannot determine", str(told))
+    stated = [run.stderr.splitlines() for run in both]
+    checks.check(stated[0] == stated[1] and stated[0][:1] and
+                 stated[0][0].startswith("before the run: these positions and levels do not determine one by one: D_"),
+                 "of both it is stated before what three positions cannot determine", str(stated))
     # Degrees and back move an angle by 1e-16 of itself: nothing beside sigma.
     close = all(a["value"] is None and b["value"] is None or math.isclose(a["value"], b["value"], abs_tol=1e-6 * a["sigma"])
                 for a, b in zip(direct["parameters"], from_csv.get("parameters", [{}] * 30)))
@@ -353,7 +353,7 @@ def exports(checks, rig, folder, path):
                            capture_output=True, text=True, cwd=rig.folder, restore_signals=False,
                            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)))
     checks.check(small.returncode == 2 and "small.mat" in small.stderr and "cannot be written whole" in small.stderr,
-                 "a MATLAB file that is not whole is told", small.stderr)
+                 "a MATLAB file that is not whole is reported", small.stderr)
     os.mkfifo(os.path.join(rig.folder, "fifo"))
     to_fifo = offline(rig, "export", folder, "--to", "mat", "-o", "fifo")
     checks.check(to_fifo.returncode == 2 and "expected one or a new name" in to_fifo.stderr and

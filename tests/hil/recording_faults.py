@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """vibrigd records on a disk that is read-only, fails with EIO, is full and takes 10 s for an fsync, one after the other
-in one campaign on the real clock: measurement goes on, what is lost is told once and accounted for to the sample.
+in one campaign on the real clock: measurement goes on, what is lost is reported once and accounted for to the sample.
 
 usage: recording_faults.py PROGRAMS
 """
@@ -62,7 +62,7 @@ class SickDisk:
         subprocess.run(["umount", "-l", self.folder], check=False, capture_output=True)
 
 
-def told(rig, words):
+def logged(rig, words):
     return [line for line in rig.tool("events").stdout.splitlines() if "recorder" in line and words in line]
 
 
@@ -80,14 +80,14 @@ def measuring(checks, rig, what):
 
 
 def ill_and_well(checks, rig, what, say, fall_ill, get_well, next_file):
-    before = len(told(rig, say))
+    before = len(logged(rig, say))
     fall_ill()
     status = rig.wait_for(lambda s: not good(s), 30)
     checks.check(not good(status) and say in status["recorder"]["note"], f"{what}: recording says that it is degraded",
                  str(status["recorder"]))
     time.sleep(1.6)   # it has tried again, and found the same
     measuring(checks, rig, what)
-    checks.equal(len(told(rig, say)) - before, 1, f"{what}: it is told once")
+    checks.equal(len(logged(rig, say)) - before, 1, f"{what}: it is reported once")
     get_well()
     status = rig.wait_for(good, 30)
     checks.check(good(status) and status["recorder"]["file"].endswith(next_file) and
@@ -109,11 +109,11 @@ def slow_fsync(checks, rig, disk):
                  status["recorder"]["file"] == before["file"], "fsync of 10 s: then it goes on, nothing is lost",
                  str(status["recorder"]))
     def counts():
-        return len(told(rig, "does not go on")), len(told(rig, "goes on again"))
+        return len(logged(rig, "does not go on")), len(logged(rig, "goes on again"))
 
     rig.wait_for(lambda s: counts()[0] == counts()[1], 30)
     # A segment takes two of them, and the second may be slow, too.
-    checks.check(counts()[0] == counts()[1] in (1, 2), "fsync of 10 s: it is told once, and that it is over", str(counts()))
+    checks.check(counts()[0] == counts()[1] in (1, 2), "fsync of 10 s: it is reported once, and that it is over", str(counts()))
 
 
 def accounts(checks, rig, disk):

@@ -158,7 +158,7 @@ def estimates(rig):
 
 
 def noise_goes_on(checks, programs, folder):
-    """Gyros eight times as noisy as the filter was told: its N is changed between positions. Killed after that, it goes
+    """Gyros eight times as noisy as the filter assumes: its N is changed between positions. Killed after that, it goes
     on with what filter and noise monitor had learnt, as if nothing had happened."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:

@@ -219,7 +219,7 @@ class Rig:
             if any(answer.startswith("error: ") for answer in answers):
                 break
             time.sleep(0.005)
-        raise RuntimeError(f"vibrig-plant, told to {line}: {self.plant.text()[known:]}")
+        raise RuntimeError(f"vibrig-plant, asked to {line}: {self.plant.text()[known:]}")
 
     def be_punctual(self):
         """In real time a rig comes first, whatever else the machine does: a late frame would be taken for a fault of the

@@ -25,8 +25,8 @@ def campaign(checks, programs, folder):
         checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
                      f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
         r.check_balances(checks, rig)
-        told = rig.tool("status", "--json")
-        checks.equal(sorted(json.loads(told.stdout or "{}")), sorted(rig.status() or {"no": "answer"}),
+        answer = rig.tool("status", "--json")
+        checks.equal(sorted(json.loads(answer.stdout or "{}")), sorted(rig.status() or {"no": "answer"}),
                      "vibrig status --json has what the daemon's own interface has")
         path, _ = rig.result()
         checks.check(path is not None, "there is a result.json")
@@ -40,7 +40,7 @@ def campaign(checks, programs, folder):
 
 
 def end_without_rig(checks, programs, folder):
-    """The rig dies, its clock with it, at the moment the daemon is told to end while the table shakes."""
+    """The rig dies, its clock with it, at the moment the daemon is ordered to end while the table shakes."""
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
         start(rig, dwell_s=7200.0)   # still shaking when the rig dies, however fast its clock

@@ -101,19 +101,19 @@ def check_rate(checks, what, reached, wanted, seconds, evidence):
     if reached >= ENOUGH * wanted:
         checks.check(True, text)
         return
-    told = "the kernel does not say who waited for a processor"
+    shares = "the kernel does not say who waited for a processor"
     starved = False
     if evidence is not None:
         missing = (1 - reached / wanted) * seconds
-        told = "; ".join(f"{who} ran {ran:.1f} s and waited {waited:.1f} s of {seconds:.0f} s for a processor"
+        shares = "; ".join(f"{who} ran {ran:.1f} s and waited {waited:.1f} s of {seconds:.0f} s for a processor"
                          for who, (ran, waited) in zip(("server", "load"), evidence))
         # Both would have been fast enough with a processor each, and together waited as long as is missing.
         able = all(reached / ran * seconds >= ENOUGH * wanted for ran, _ in evidence)
         starved = able and sum(waited for _, waited in evidence) >= missing
     if starved:
-        checks.skip(text, "processors taken: " + told)
+        checks.skip(text, "processors taken: " + shares)
     else:
-        checks.check(False, text, told)
+        checks.check(False, text, shares)
 
 
 def main():

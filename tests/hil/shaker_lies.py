@@ -45,7 +45,7 @@ def tripped_by(rig, names):
 
 
 def found_while_shaking(checks, rig, what, lies, names, limit_s):
-    """Told while the table does 5 g: a trip by one of these names in its time, then rest."""
+    """Begun while the table does 5 g: a trip by one of these names in its time, then rest."""
     shaking, found = rig.shake()
     if not checks.check(shaking, f"{what}: the table shakes before", found + "\n" + rig.logs()):
         return
@@ -59,7 +59,7 @@ def found_while_shaking(checks, rig, what, lies, names, limit_s):
 
 
 def found_on_the_way_up(checks, rig, what, lies, names):
-    """Told before the start: no dwell is ever recorded."""
+    """Begun before the start: no dwell is ever recorded."""
     rig.rest()
     lie(rig, *lies)
     said = [rig.command(kind) for kind in ("arm", "start")]
@@ -148,7 +148,7 @@ def unseen(checks, rig, what, lies):
 
 
 def moves_alone(checks, rig, what):
-    """The table moves, every register says rest, nobody is armed: told by the accelerometers."""
+    """The table moves, every register says rest, nobody is armed: shown by the accelerometers."""
     rig.rest()
     requests = rig.status()["shaker"]["running"]
     rig.order("table 0.4")

@@ -61,8 +61,8 @@ def failed_once(checks, run, words, text):
     run.ended(checks, "aborted", text + ": the campaign is aborted")
     for word in words:
         checks.check(word in run.reason(), f"{text}: the reason names \"{word}\"", run.reason())
-    told = [line for line in run.events("error campaign") if "gravity" not in line]   # which a wrong zero turns as well
-    checks.check(len(told) == 1, f"{text}: one event says so", "\n".join(told))
+    logged = [line for line in run.events("error campaign") if "gravity" not in line]   # which a wrong zero turns as well
+    checks.check(len(logged) == 1, f"{text}: one event says so", "\n".join(logged))
     checks.check(not run.last["campaign"]["dwells"], f"{text}: no data were taken")
 
 

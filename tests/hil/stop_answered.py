@@ -85,7 +85,7 @@ def start(rig, environment=None):
     rig.wait_for(r.measuring, 30)
 
 
-def told(rig, words):
+def logged(rig, words):
     return [line for line in rig.tool("events").stdout.splitlines() if words in line]
 
 
@@ -138,11 +138,11 @@ def doors_removed(checks, rig):
     for what, do in (("socket removed", lambda: os.unlink(rig.socket)), ("socket moved away", lambda: os.rename(rig.socket, elsewhere)),
                      ("a file in its place", by_a_file), ("a dead socket in its place", by_a_dead_socket)):
         shake(checks, rig, what)
-        before = len(told(rig, "made anew"))
+        before = len(logged(rig, "made anew"))
         do()
         checks.check(rig.wait_for(lambda t: True, 10) is not None, f"{what}: the door is there again")
         stops(checks, rig, what)
-        checks.equal(len(told(rig, "made anew")) - before, 1, f"{what}: it is told once")
+        checks.equal(len(logged(rig, "made anew")) - before, 1, f"{what}: it is reported once")
     with open(rig.socket + ".found", encoding="ascii") as file:
         checks.equal(file.read(), "not a socket", "what was there is kept")
     door = rig.status()["server"]["doors"][0]
@@ -157,8 +157,8 @@ def doors_removed(checks, rig):
         os.unlink(rig.socket)
     finally:
         other.close()
-    checks.check(rig.wait_for(lambda t: True, 10) is not None and len(told(rig, "another vibrigd answers")) == 1,
-                 "somebody else's living socket is left alone, and told", told(rig, "made anew"))
+    checks.check(rig.wait_for(lambda t: True, 10) is not None and len(logged(rig, "another vibrigd answers")) == 1,
+                 "somebody else's living socket is left alone, and reported", logged(rig, "made anew"))
     checks.equal(rig.daemon.end(timeout=30), 0, "it ends cleanly")
     checks.check(not os.path.exists(rig.socket), "and takes its own socket with it")
 
@@ -174,7 +174,7 @@ def crowd(checks, rig):
             one.connect(rig.socket)
             held.append(one)
         status, text, _ = ask(rig.socket, "GET", "/api/v1/status")
-        checks.equal(status, 503, "crowd: who looks is told that there is no place")
+        checks.equal(status, 503, "crowd: who looks is answered that there is no place")
         first = command(rig, "abort")
         took = [first[2]] + [command(rig, "abort")[2] for _ in range(TRIES - 1)]
         checks.check(first[0] == 200 and min(took) < WITHIN_S, f"crowd: an abort is answered within {WITHIN_S} s ({min(took) * 1e3:.0f} ms)",

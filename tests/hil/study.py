@@ -144,8 +144,8 @@ def twice_at_once(b):
             break
         time.sleep(0.05)
     running.append(subprocess.Popen(running[0].args, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True))
-    told = [process.communicate()[1] for process in running]
-    b.checks.check("another run of this shard" in told[1], "who runs a shard that runs is told", told[1])
+    output = [process.communicate()[1] for process in running]
+    b.checks.check("another run of this shard" in output[1], "who runs a shard that runs is refused with the reason", output[1])
     b.checks.equal([process.returncode for process in running], [0, 0], "both go on")
     b.same(folder, "what was done twice is the same")
 
@@ -167,7 +167,7 @@ def kills(b):
 
 
 def ended(job):
-    """Its status; one that waits for a process that died while it started, as mpirun may, is told to end."""
+    """Its status; one that waits for a process that died while it started, as mpirun may, is ordered to end."""
     for last in (job.terminate, job.kill):
         try:
             return job.wait(timeout=60)
@@ -367,9 +367,9 @@ def mpi(b, count):
     while job.poll() is None and not b.parts(folder):
         time.sleep(0.02)
     job.terminate()   # mpirun hands it on
-    told = job.communicate(timeout=60)[1]
+    output = job.communicate(timeout=60)[1]
     b.checks.check(job.returncode != 0 and not [path for path in b.parts(folder) if path.endswith(".tmp")],
-                   "ranks that are told to stop close their parts", told)
+                   "ranks that are ordered to stop close their parts", output)
     linked = "".join(subprocess.run(["ldd", os.path.join(os.path.dirname(b.vibrig), program)], capture_output=True,
                                     text=True, check=True).stdout for program in ("vibrig", "vibrigd"))
     b.checks.check("libmpi" not in linked, "vibrig and vibrigd link no MPI")
@@ -448,7 +448,7 @@ def kill_nodes(b, folder, number):
 def in_slurm(b, calm, storm, *storms):
     began = time.monotonic()
     run = b.study("submit", calm, "--slurm", "--shards", "4", "--", "--wait")
-    b.checks.check(run.returncode == 0 and run.stdout.startswith("job "), "sbatch takes an array, and waits if told",
+    b.checks.check(run.returncode == 0 and run.stdout.startswith("job "), "sbatch takes an array, and waits if asked to",
                    run.stdout + run.stderr)
     b.checks.note(f"calm array: {time.monotonic() - began:.0f} s")
     job = json.loads(b.study("submit", storm, "--slurm", "--shards", "4", "--json").stdout)["job"]

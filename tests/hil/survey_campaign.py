@@ -109,7 +109,7 @@ def judge(checks, programs, rig, result, path, log, dwells, frequencies):
                  "the prediction at 55 Hz is confirmed on the dwells held out", proof.stdout + proof.stderr)
     shown = [(round(z, 6) for z in d["z"]) for d in spectrum.get("held_out", [])]
     checks.equal([list(z) for z in shown], [[round(z, 6) for z in d["z"]] for d in verification.get("dwells", [])],
-                 "the result has them beside what was foretold")
+                 "the result has them beside what was predicted")
     page = os.path.join(rig.folder, "report.html")
     made = vibrig(programs, "report", recorded, "-o", page)
     checks.check(made.returncode == 0 and "Dwells held out from the fit" in open(page, encoding="utf-8").read(),
@@ -145,7 +145,7 @@ def ignored(checks, programs, folder):
                      "the accelerometers do not show the vibration" in last["campaign"]["reason"],
                      "frequency_ignored: the daemon trips by wrong_vibration", f"{r.state_of(last)}\n{rig.daemon.text()[-3000:]}")
         checks.equal(rows, [], "frequency_ignored: not a sample is taken at the wrong frequency")
-        checks.check(rig.daemon.says("Hz were asked for and read back"), "frequency_ignored: both frequencies are told",
+        checks.check(rig.daemon.says("Hz were asked for and read back"), "frequency_ignored: both frequencies are reported",
                      rig.daemon.text()[-2000:])
     finally:
         rig.stop()

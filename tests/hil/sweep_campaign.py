@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Sweeps up and down beside dwells at 15 Hz, unattended, over the seqpacket bus on the rig's clock: chosen at rest, read back, followed,
 recorded, and the resonance named by them. The same killed in the midst of a sweep, and resumed; aborted in one. And controllers that sweep
-otherwise than they are told, or only say so.
+otherwise than commanded, or only say so.
 
 usage: sweep_campaign.py PROGRAMS [--soak]     soak: sweeps of 300 s, and more kinds of lies
 """
@@ -219,7 +219,7 @@ def lies(checks, programs, folder, name, faults, trip, says):
                  "amplitude_witness": "an accelerometer disagrees with the commanded amplitude"}
         checks.check(last and last["campaign"]["state"] == "tripped" and trips[trip] in last["campaign"]["reason"],
                      f"{name}: the daemon trips by {trip}", f"{r.state_of(last)}\n{log[-3000:]}")
-        checks.check(rig.daemon.says(says), f"{name}: what is wrong is told", log[-3000:])
+        checks.check(rig.daemon.says(says), f"{name}: what is wrong is reported", log[-3000:])
         _, text = rig.result()
         checks.equal(((json.loads(text) if text else {}).get("spectrum") or {}).get("sweeps", []), [],
                      f"{name}: nothing of it is in a result")
@@ -239,12 +239,12 @@ def main():
         resumed(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         aborted(checks, programs, folder)
-    # A lock-in at the frequency that was told, or said, sees little of another: the amplitude's witness is the first to know.
+    # A lock-in at the frequency that was commanded, or reported, sees little of another: the amplitude's witness is the first to know.
     wrong, amplitude = "wrong_vibration", "amplitude_witness"
     always = (("frequency_ignored", ("frequency-ignored",), amplitude, "6 g commanded"),
               ("other_way", ("sweep-rate-scaled=-1",), wrong, "goes the other way"),
               ("rate_lies_and_is_not_said", ("sweep-rate-scaled=1.5", "actual-as-told"), amplitude, "6 g commanded"))
-    # Told apart by the unit tests of SweepWatch.
+    # Distinguished by the unit tests of SweepWatch.
     of_units = (("frequency_ignored_and_not_said", ("frequency-ignored", "actual-as-told"), amplitude, "6 g commanded"),
                 ("stands_still", ("sweep-rate-scaled=0",), wrong, "stands still"),
                 ("rate_lies", ("sweep-rate-scaled=1.5",), wrong, "after it began"))

@@ -1,4 +1,4 @@
-"""vibrig.Client against a server that answers as told; the real one is tests/hil/python_package.py."""
+"""vibrig.Client against a server that answers as set; the real one is tests/hil/python_package.py."""
 import base64
 import contextlib
 import hashlib
