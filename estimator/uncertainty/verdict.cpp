@@ -322,12 +322,11 @@ void add_cross_check(const CrossCheck& check, std::vector<Reason>& list) {
 
 void add_order(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
     if (!(a.worst_step > kMostStep) || settings.drift.power == Power::unbroken) return;
-    list.push_back(
-        {"order",
-         "in this order a step of the bias between the runs cannot be distinguished from D_F, "
-         "D_II, D_SS, D_OO: use the balanced order, or state that power was not "
-         "interrupted",
-         Level::doubtful});
+    list.push_back({"order",
+                    "in this order a step of the bias between the runs cannot be told from D_F, "
+                    "D_II, D_SS, D_OO: use the balanced order, or state that power was not "
+                    "interrupted",
+                    Level::doubtful});
 }
 
 std::string smallest_seen(const Assessment& a) {

@@ -197,8 +197,7 @@ struct Calibration::Impl {
         if (std::abs(rate) > 0.2 * planned) still_since_s = now_s;
         if (now_s - still_since_s >= kNoMotion_s) {
             return give_up(
-                text("azimuth has not turned for %.0f s: x and y zeros cannot be distinguished "
-                     "from tilt "
+                text("azimuth has not turned for %.0f s: x and y zeros cannot be told from tilt "
                      "(rank 12 of 15)",
                      now_s - still_since_s));
         }

@@ -177,11 +177,10 @@ void check_observable(const SlewPlan& plan, const Site& site) {
     }
     std::array<char, 160> text{};
     if (found.rank < kStates) {
-        std::snprintf(
-            text.data(), text.size(),
-            "slew plan: rank %d of 15, x and y zeros cannot be distinguished from tilt; not "
-            "observable: ",
-            found.rank);
+        std::snprintf(text.data(), text.size(),
+                      "slew plan: rank %d of 15, x and y zeros cannot be told from tilt; not "
+                      "observable: ",
+                      found.rank);
     } else {
         std::snprintf(
             text.data(), text.size(),
