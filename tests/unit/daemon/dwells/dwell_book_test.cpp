@@ -213,7 +213,9 @@ std::string of(const estimator::spectrum::Sweep& sweep) {
         text += fmt::format("{:a} {:a} {:a} {}", block.time_s, block.from_hz, block.to_hz,
                             block.samples);
         for (const double value : block.angle_rad) text += fmt::format(" {:a}", value);
-        for (const double value : block.moment.reshaped()) text += fmt::format(" {:a}", value);
+        if (block.moment)
+            for (const auto& row : *block.moment)
+                for (const double value : row) text += fmt::format(" {:a}", value);
         text += "\n";
     }
     return text;

@@ -1,4 +1,4 @@
-#include "estimator/spectrum/sweep.hpp"
+#include "estimator/spectrum/swept_rates.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,8 +36,7 @@ Sweep sweep_of(double from_hz, double to_hz, double seconds, double peak_g,
         block.from_hz = hz_at(k);
         block.to_hz = hz_at(k + 1);
         for (std::size_t i = 0; i < 3; ++i) block.angle_rad[i] = deg[i] / kPerRadian;
-        block.moment = Eigen::Matrix3d::Zero();
-        block.moment(1, 1) = peak_g * peak_g / 2;
+        block.moment.emplace()[1][1] = peak_g * peak_g / 2;
         sweep.blocks.push_back(block);
     }
     return sweep;
@@ -136,15 +135,14 @@ TEST(Sweep, WhatIsNotKnownIsLeftOutAndNothingElse) {
     const Settings settings;
     Sweep sweep = sweep_of(20, 120, 100, 6);
     EXPECT_EQ(SweptRates(settings, sweep, 1).size(), 99);
-    const auto nothing = SweepBlock{}.moment;
-    for (const std::size_t k : {0U, 50U, 51U, 60U, 62U, 99U}) sweep.blocks[k].moment = nothing;
+    for (const std::size_t k : {0U, 50U, 51U, 60U, 62U, 99U}) sweep.blocks[k].moment.reset();
     EXPECT_EQ(sweep.known(), 94U);
     const SweptRates swept(settings, sweep, 1);
     // Of 94 in the stretches 1-49, 52-59, 61, 63-98: one rate fewer than blocks in each.
     EXPECT_EQ(swept.size(), 94 - 4);
     EXPECT_TRUE(swept.rate().allFinite() && swept.base().allFinite() &&
                 swept.elastic(testing::kSixty).allFinite());
-    for (SweepBlock& block : sweep.blocks) block.moment = nothing;
+    for (SweepBlock& block : sweep.blocks) block.moment.reset();
     EXPECT_EQ(SweptRates(settings, sweep, 1).size(), 0);
     EXPECT_EQ(SweptRates(settings, {}, 0).size(), 0);
     Sweep back = sweep_of(20, 120, 10, 6);
@@ -299,7 +297,8 @@ void let_drift(const Settings& settings, const testing::Truth& truth, Sweep& swe
     const Pose pose = kinematics.pose(angles);
     std::vector<Eigen::Vector3d> rates;
     for (const SweepBlock& block : sweep.blocks) {
-        const Attitude at = attitude(settings, angles, block.moment);
+        const Attitude at = attitude(
+            settings, angles, Eigen::Map<const Eigen::Matrix3d>(block.moment->front().data()));
         Eigen::Vector3d rate;
         for (std::size_t j = 0; j < 3; ++j) {
             double one = 0;
