@@ -219,7 +219,7 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     const auto& rows = with_.book.identification().rows();
     if (!summary.left_out && !rows.empty() && rows.back().run == summary.run &&
         rows.back().position == summary.position)
-        dwell.row = rows.back();
+        dwell.numbers = record::numbers_of(rows.back());
     with_.recorder->dwell_done(std::move(dwell));
 }
 

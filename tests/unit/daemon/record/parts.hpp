@@ -10,6 +10,7 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
+#include "estimator/identification/dwell_row.hpp"
 
 namespace vibrig::record {
 
@@ -93,7 +94,7 @@ class Parts : public ::testing::Test {
             dwell.summary.run = 1;
             dwell.summary.position = orders[i];
             dwell.summary.samples = 100;
-            if (i > 0) dwell.row = row_of(orders[i]);
+            if (i > 0) dwell.numbers = numbers_of(row_of(orders[i]));
             writer.put(dwell);
         }
         writer.end({state, "", "", "{}", head.utc_ns + kSecond});
