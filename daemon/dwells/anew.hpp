@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/noise/found.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
