@@ -6,6 +6,7 @@
 
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/identification/observability.hpp"
+#include "estimator/identification/planned_covariance.hpp"
 #include "estimator/identification/two_step.hpp"
 
 namespace vibrig::estimator {
