@@ -15,6 +15,8 @@
 
 namespace vibrig::commission {
 
+using estimator::commissioning::Verdict;
+
 /// The newest sample, or the mean of a second, as the bus says: angles in deg, g.
 struct Look {
     drivers::Time from = 0, to = 0;
