@@ -9,9 +9,11 @@
 #include <fstream>
 
 #include "daemon/app/campaign_forecast.hpp"
+#include "daemon/app/judged.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/configuration/random_profiles.hpp"
+#include "daemon/plan/type_prior.hpp"
 #include "daemon/results/result_json.hpp"
 
 namespace vibrig {
