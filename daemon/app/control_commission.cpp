@@ -9,6 +9,8 @@
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/bus_bits.hpp"
+#include "daemon/commission/procedure.hpp"
+#include "daemon/commission/progress.hpp"
 #include "estimator/filter/angles.hpp"
 
 namespace vibrig {

@@ -6,9 +6,17 @@
 #include <chrono>
 #include <utility>
 
+#include "daemon/commission/procedure.hpp"
+
 namespace vibrig {
 
 using drivers::Time;
+
+ControlLoop::ControlLoop(Parts& parts, journal::Latches& latches, Supervisor& supervisor,
+                         Outside& outside)
+    : parts_(parts), latches_(latches), supervisor_(supervisor), outside_(outside) {}
+
+ControlLoop::~ControlLoop() = default;
 
 void ControlLoop::run() {
     rt::Tripped handled;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -14,10 +15,14 @@
 #include "daemon/app/parts.hpp"
 #include "daemon/app/supervisor.hpp"
 #include "daemon/commission/book.hpp"
-#include "daemon/commission/procedure.hpp"
-#include "daemon/commission/progress.hpp"
 #include "daemon/commission/shaker_parts.hpp"
 #include "daemon/journal/latches.hpp"
+
+namespace vibrig::commission {
+class Procedure;
+class Progress;
+struct Ports;
+}  // namespace vibrig::commission
 
 namespace vibrig {
 
@@ -25,8 +30,8 @@ namespace vibrig {
 /// What of a command outlives the daemon goes into the journal first.
 class ControlLoop {
   public:
-    ControlLoop(Parts& parts, journal::Latches& latches, Supervisor& supervisor, Outside& outside)
-        : parts_(parts), latches_(latches), supervisor_(supervisor), outside_(outside) {}
+    ControlLoop(Parts& parts, journal::Latches& latches, Supervisor& supervisor, Outside& outside);
+    ~ControlLoop();
 
     // Before the thread runs.
 
