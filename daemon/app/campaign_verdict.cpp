@@ -50,7 +50,7 @@ bool CampaignDwells::verdict_wanted() {
     return dwells <= kEveryDwell || dwells % kAmongMany == 0;
 }
 
-std::optional<CampaignDwells::Again> CampaignDwells::again() const {
+std::optional<Again> CampaignDwells::again() const {
     const auto found = with_.book.noise().found();
     if (!found) return {};
     return Again{*found, with_.journal ? with_.journal->status().path : std::string(),

@@ -8,7 +8,6 @@
 
 #include "daemon/domain/events.hpp"
 #include "daemon/dwells/live.hpp"
-#include "daemon/noise/found.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"

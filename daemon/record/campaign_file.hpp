@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/domain/events.hpp"
 #include "daemon/noise/found.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/records.hpp"

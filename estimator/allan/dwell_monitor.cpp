@@ -37,8 +37,7 @@ VectorXd variances(const DwellAngles& dwell, double white, double walk) {
 
 /// An offset common to all cancels in differences, but not its rounding.
 VectorXd centred(const DwellAngles& dwell) {
-    const auto angle = mapped(dwell.angle_arcsec);
-    return (angle.array() - angle[0]).matrix();
+    return (mapped(dwell.angle_arcsec).array() - dwell.angle_arcsec[0]).matrix();
 }
 
 /// Variance of averages over m blocks side by side in the longest part without gaps, about the mean
@@ -75,8 +74,7 @@ double scale_of(std::size_t slow_term, double block_s) {
 std::size_t DwellMonitor::tests_of(const DwellBasis& basis) { return basis.octaves.size() + 1; }
 
 std::size_t DwellMonitor::dwells_at(std::size_t level) const {
-    return static_cast<std::size_t>(std::count_if(
-        dwells_.begin(), dwells_.end(), [&](const Kept& kept) { return kept.level == level; }));
+    return static_cast<std::size_t>(std::ranges::count(dwells_, level, &Kept::level));
 }
 
 void DwellMonitor::learn(const DwellAngles& dwell, bool all) {
@@ -120,13 +118,13 @@ DwellMonitor::Solution DwellMonitor::solve(std::optional<double> fixed_walk) con
         double score_q = 0, qq = 0;
         std::vector<double> score_r(levels, 0), qr(levels, 0), rr(levels, 0);
         for (const Kept& kept : dwells_) {
-            const auto contrasts = mapped(kept.contrasts);
             const VectorXd v = variances(kept.dwell, s.white[kept.level], s.walk);
             const double a = kept.dwell.white_share;
             for (Eigen::Index i = 0; i < v.size(); ++i) {
                 const double b = kept.dwell.block_s * kept.dwell.basis->walk[i];
                 const double weight = 1 / squared(v[i]);
-                const double excess = (squared(contrasts[i]) - v[i]) * weight;
+                const double excess =
+                    (squared(kept.contrasts[static_cast<std::size_t>(i)]) - v[i]) * weight;
                 score_q += excess * b;
                 score_r[kept.level] += excess * a;
                 qq += b * b * weight;
@@ -296,10 +294,9 @@ void DwellMonitor::find_smallest_change() {
     if (!terms_[static_cast<std::size_t>(Term::N)].detected) return;
     const auto& octaves = newest.dwell.basis->octaves;
     for (std::size_t i = 0; i < octaves.size(); ++i) {
-        const DwellBasis::Octave& octave = octaves[i];
         const double white =
-            newest.dwell.white_share * solution_.white[newest.level] * octave.white_trace;
-        const double walk = solution_.walk * newest.dwell.block_s * octave.walk_trace;
+            newest.dwell.white_share * solution_.white[newest.level] * octaves[i].white_trace;
+        const double walk = solution_.walk * newest.dwell.block_s * octaves[i].walk_trace;
         const double high = bounds(newest.dwell, i, newest.level)[1];
         const double change = std::sqrt((high * (white + walk) - white) / walk);
         smallest_change_ = smallest_change_ > 0 ? std::min(smallest_change_, change) : change;

@@ -5,13 +5,13 @@
 #include <functional>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/settings.hpp"
 #include "estimator/spectrum/profile_moments.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
 
-using AxisMap = Eigen::Map<const Eigen::Vector3d>;
 using Breakpoint = std::pair<double, double>;
 
 std::string text_of(double value) {
@@ -136,9 +136,9 @@ bool AxesPsd::stated() const noexcept {
 }
 
 std::optional<std::array<double, 3>> direction_along(const std::array<double, 3>& axes) noexcept {
-    if (!(AxisMap(axes.data()).norm() > 0)) return {};
+    if (!(mapped(axes).norm() > 0)) return {};
     std::array<double, 3> out{};
-    Eigen::Map<Eigen::Vector3d>(out.data()) = AxisMap(axes.data()).normalized();
+    mapped(out) = mapped(axes).normalized();
     return out;
 }
 
@@ -163,7 +163,7 @@ void check(const Profile& profile, const std::string& path) {
     if (!(mean_square(profile) <= kMostRms * kMostRms))
         throw SettingsError(path + "found more than 10000 g rms, expected a vibration");
     check_axes(profile.axes, path);
-    const double length = AxisMap(profile.direction.data()).norm();
+    const double length = mapped(profile.direction).norm();
     if (!(std::abs(length - 1) < 1e-6))
         throw SettingsError(path + "direction: found a length of " + text_of(length) +
                             ", expected a direction (north, up, east)");
@@ -211,7 +211,7 @@ std::vector<Band> bands_of(const Profile& profile, int per_decade) {
 }
 
 std::vector<Eigen::Matrix3d> moments_of(const Profile& profile, int per_decade) {
-    const AxisMap direction(profile.direction.data());
+    const auto direction = mapped(profile.direction);
     const Eigen::Matrix3d along = direction * direction.transpose();
     const double all = mean_square(profile);
     std::vector<Eigen::Matrix3d> out;

@@ -7,6 +7,7 @@
 
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -116,7 +117,7 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         const auto i = static_cast<Index>(k);
         root[i] = std::sqrt(window);
         columns.row(i) << 1, std::cos(phase), std::sin(phase);
-        force.row(i) << s.force[0], s.force[1], s.force[2];
+        force.row(i) = mapped(s.force);
         sum += window;
     }
     if (!(sum > 0)) return;
@@ -145,10 +146,7 @@ void SweepBlocks::take_moment(SweepBlock& block) {
     const Pose pose = kinematics.pose(kinematics.gimbal_angles(block.angle_rad));
     moment = (pose.level.transpose() * moment * pose.level).eval();
     if (!moment.allFinite()) return;
-    auto& level = block.moment.emplace();
-    for (std::size_t a = 0; a < 3; ++a)
-        for (std::size_t b = 0; b < 3; ++b)
-            level[a][b] = moment(static_cast<Index>(a), static_cast<Index>(b));
+    mapped(block.moment.emplace()) = moment;
 }
 
 }  // namespace vibrig::estimator::spectrum

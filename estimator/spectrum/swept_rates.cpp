@@ -9,6 +9,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
@@ -17,8 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-using Moment = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
 
 /// Mean over a block of what a vibration there sees of an elastic coefficient, less 1. Simpson's
 /// rule over ln f, five points: narrower resonances than the block are no quadratic in it.
@@ -46,7 +45,7 @@ SweptRates::SweptRates(const Settings& settings, const Sweep& sweep, std::size_t
         const SweepBlock* const before = std::exchange(last, block.moment ? &block : nullptr);
         if (last == nullptr) continue;
         const Vector3d angles = kinematics.gimbal_angles(block.angle_rad);
-        const Attitude at = attitude(settings, angles, Moment(block.moment->front().data()));
+        const Attitude at = attitude(settings, angles, mapped(*block.moment));
         blocks_.push_back({{block.from_hz, block.to_hz}, at.vibration[gyro]});
         base.push_back(at.base[gyro]);
         if (before == nullptr) continue;

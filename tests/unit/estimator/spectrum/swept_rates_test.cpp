@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/analysis.hpp"
 #include "estimator/spectrum/resonance.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
@@ -238,9 +239,8 @@ struct Campaign {
         problem.prior_sigma.head(4).setConstant(10);
         for (Eigen::Index k = 0; k < n; ++k) {
             const DwellRow& row = table->rows()[static_cast<std::size_t>(k)];
-            problem.rate[k] = row.rate[static_cast<Eigen::Index>(j)];
-            problem.covariance(k, k) =
-                row.variance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
+            problem.rate[k] = row.rate[j];
+            problem.covariance(k, k) = row.variance[j][j];
         }
         for (const Sweep& sweep : sweeps) problem.swept.emplace_back(settings, sweep, j);
         return one_resonance(*table, j, problem);
@@ -297,8 +297,7 @@ void let_drift(const Settings& settings, const testing::Truth& truth, Sweep& swe
     const Pose pose = kinematics.pose(angles);
     std::vector<Eigen::Vector3d> rates;
     for (const SweepBlock& block : sweep.blocks) {
-        const Attitude at = attitude(
-            settings, angles, Eigen::Map<const Eigen::Matrix3d>(block.moment->front().data()));
+        const Attitude at = attitude(settings, angles, mapped(*block.moment));
         Eigen::Vector3d rate;
         for (std::size_t j = 0; j < 3; ++j) {
             double one = 0;
