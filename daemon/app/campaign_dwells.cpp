@@ -9,9 +9,11 @@
 #include <fstream>
 
 #include "daemon/app/campaign_forecast.hpp"
+#include "daemon/app/judged.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/configuration/random_profiles.hpp"
+#include "daemon/plan/type_prior.hpp"
 #include "daemon/results/result_json.hpp"
 
 namespace vibrig {
@@ -219,7 +221,7 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     const auto& rows = with_.book.identification().rows();
     if (!summary.left_out && !rows.empty() && rows.back().run == summary.run &&
         rows.back().position == summary.position)
-        dwell.row = rows.back();
+        dwell.numbers = record::numbers_of(rows.back());
     with_.recorder->dwell_done(std::move(dwell));
 }
 

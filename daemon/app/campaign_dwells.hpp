@@ -11,18 +11,24 @@
 #include "daemon/archive/outbox.hpp"
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/ports.hpp"
-#include "daemon/dwells/anew.hpp"
 #include "daemon/dwells/dwell_book.hpp"
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/aside.hpp"
-#include "daemon/plan/type_prior.hpp"
-#include "daemon/results/spectrum_result.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/stirred_waiter.hpp"
 #include "estimator/identification/result.hpp"
-#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig::estimator::uncertainty {
+struct Assessment;
+}
+namespace vibrig::plan {
+struct TypePrior;
+}
 
 namespace vibrig {
+
+struct Again;
+struct Judged;
 
 /// What of the configuration results depend on; not where things are kept or how one talks to the
 /// daemon.
@@ -87,29 +93,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] VerdictStatus verdict() const;
 
   private:
-    /// What is to be made of the dwells at the end: they are in the journal.
-    struct Again {
-        noise::Found found;
-        std::string journal;
-        std::uint64_t configuration_hash = 0;
-    };
-    /// What can be believed of the dwells, or of the same identified anew.
-    struct Judged {
-        estimator::uncertainty::Assessment assessed;
-        std::optional<estimator::Result> anew;
-        std::shared_ptr<const dwells::Live> live;           ///< what `anew` replaces
-        std::string not_anew;                               ///< why not, though it should be
-        std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
-    };
     [[nodiscard]] std::optional<Again> again() const;
-    [[nodiscard]] static Judged judge(
-        const estimator::Settings& settings, const estimator::Result& result,
-        const std::optional<Again>& again, estimator::uncertainty::Stage stage,
-        const std::vector<estimator::DwellRow>& all_rows, const tool::NumberedKinds& profiles,
-        std::vector<estimator::spectrum::Sweep> sweeps, const tool::PlayedBands& psds);
-    [[nodiscard]] static std::vector<estimator::DwellRow> assess(
-        Judged& out, const estimator::Settings& settings, const estimator::Result& result,
-        const std::optional<Again>& again, estimator::uncertainty::Stage stage);
     [[nodiscard]] std::size_t planned_dwells() const;
     [[nodiscard]] bool verdict_wanted();
     void record_dwell(const estimator::DwellSummary& summary);
@@ -121,7 +105,6 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] estimator::Result whole_result() const;
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
     void take_verdict(campaign::Campaign& campaign);
-    [[nodiscard]] static Severity severity_of(estimator::uncertainty::Level level);
     void tell_verdict(const estimator::uncertainty::Assessment& assessed,
                       campaign::Campaign& campaign);
     void write_result(const Judged& judged, campaign::Campaign& campaign);
@@ -145,7 +128,7 @@ class CampaignDwells final : public campaign::Dwells {
     /// What the control thread may not wait for.
     plan::Aside<plan::AdaptivePlan::Decision> planning_{[this] { with_.control.notify(); }};
     /// Tens of milliseconds, with hundreds of dwells seconds.
-    plan::Aside<Judged> assessing_{[this] { with_.control.notify(); }};
+    plan::Aside<std::shared_ptr<const Judged>> assessing_{[this] { with_.control.notify(); }};
     bool verdict_due_ = false;  ///< on the dwells so far
     bool concluding_ = false;   ///< the last verdict is asked for
     std::string verdict_logged_, against_certificate_;

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "daemon/app/campaign_dwells.hpp"
+#include "daemon/app/judged.hpp"
 #include "daemon/configuration/random_profiles.hpp"
-#include "daemon/journal/reread.hpp"
 
 namespace vibrig {
 
@@ -42,12 +42,6 @@ std::pair<int, int> dwell_named(const uncertainty::Assessment& assessed,
 
 }  // namespace
 
-Severity CampaignDwells::severity_of(uncertainty::Level level) {
-    return level == uncertainty::Level::not_valid  ? Severity::alarm
-           : level == uncertainty::Level::doubtful ? Severity::warning
-                                                   : Severity::info;
-}
-
 /// Of the dwells so far, of all of them when the result is to be written.
 bool CampaignDwells::verdict_wanted() {
     if (to_write_ != ToWrite::nothing) return !std::exchange(concluding_, true);
@@ -56,65 +50,11 @@ bool CampaignDwells::verdict_wanted() {
     return dwells <= kEveryDwell || dwells % kAmongMany == 0;
 }
 
-std::optional<CampaignDwells::Again> CampaignDwells::again() const {
+std::optional<Again> CampaignDwells::again() const {
     const auto found = with_.book.noise().found();
     if (!found) return {};
     return Again{*found, with_.journal ? with_.journal->status().path : std::string(),
                  journal::configuration_hash(result_configuration(with_.loaded))};
-}
-
-/// Without what other frequencies say. Returns all rows of what was identified anew; none: nothing
-/// was.
-std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
-                                                        const estimator::Settings& settings,
-                                                        const estimator::Result& result,
-                                                        const std::optional<Again>& again,
-                                                        uncertainty::Stage stage) {
-    if (again && !result.dwells.empty()) {
-        dwells::Anew anew(settings, again->found, result.dwells.size());
-        auto& identification = anew.identification();
-        out.not_anew =
-            again->journal.empty()
-                ? "no journal is kept"
-                : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
-                                  [&](const journal::DwellCheckpoint& dwell) {
-                                      const auto& all = dwell.measurements;
-                                      dwells::feed(
-                                          identification, dwell.info, all.size(),
-                                          [&all](std::size_t n) { return all[n]; }, false,
-                                          [](std::size_t, const estimator::StepResult&) {});
-                                  });
-        auto found = anew.result();
-        if (out.not_anew.empty() && found.dwells.size() != result.dwells.size())
-            out.not_anew = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
-                                       result.dwells.size(), again->journal);
-        if (out.not_anew.empty()) {
-            out.live = std::make_shared<const dwells::Live>(
-                dwells::Live{again->found, result, uncertainty::assess(settings, result)});
-            out.assessed = dwells::assess(settings, again->found, found);
-            out.anew = std::move(found);
-            return identification.rows();
-        }
-    }
-    out.assessed = uncertainty::assess(settings, result, stage);
-    return {};
-}
-
-/// `all_rows`: with those apart from the result's.
-CampaignDwells::Judged CampaignDwells::judge(
-    const estimator::Settings& settings, const estimator::Result& result,
-    const std::optional<Again>& again, uncertainty::Stage stage,
-    const std::vector<estimator::DwellRow>& all_rows, const tool::NumberedKinds& profiles,
-    std::vector<estimator::spectrum::Sweep> sweeps, const tool::PlayedBands& psds) {
-    Judged out;
-    const auto anew = assess(out, settings, result, again, stage);
-    if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
-    const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
-    out.spectrum =
-        tool::spectrum_of(in_force, out.anew ? anew : all_rows,
-                          estimator::spectrum::Form::automatic, profiles, std::move(sweeps), psds);
-    if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
-    return out;
 }
 
 /// The result becomes what was identified anew.
@@ -151,7 +91,7 @@ estimator::Result CampaignDwells::whole_result() const {
 
 void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     if (!with_.book.free()) return;
-    std::optional<Judged> judged;
+    std::shared_ptr<const Judged> judged;
     if (verdict_wanted()) {
         const auto& spectrum = with_.book.spectrum();
         // In a thread of its own also where one may wait: what it has of memory, more with each
@@ -165,7 +105,8 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
                            trim = !with_.memory_locked] {
-            auto found = judge(settings, result, anew, stage, rows, profiles, sweeps, psds);
+            auto found = std::make_shared<const Judged>(
+                judge(settings, result, anew, stage, rows, profiles, sweeps, psds));
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;
@@ -177,7 +118,7 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
             assessing_.ask(work);
         }
     }
-    if (!with_.at_once) judged = assessing_.take();
+    if (!with_.at_once) judged = assessing_.take().value_or(nullptr);
     if (!judged) return;
     tell_verdict(judged->assessed, campaign);
     if (std::exchange(concluding_, false)) write_result(*judged, campaign);

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "daemon/app/control_loop.hpp"
+#include "daemon/commission/procedure.hpp"
 
 namespace vibrig {
 

@@ -7,6 +7,7 @@
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/bus_bits.hpp"
+#include "daemon/commission/procedure.hpp"
 #include "daemon/commission/trial_log.hpp"
 #include "daemon/version.hpp"
 

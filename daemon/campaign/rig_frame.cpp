@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::campaign {

@@ -9,6 +9,8 @@
 #include <exception>
 #include <map>
 
+#include "estimator/commissioning/earth.hpp"
+
 namespace vibrig::commission {
 
 namespace room = estimator::commissioning;

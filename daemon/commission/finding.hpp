@@ -5,12 +5,17 @@
 #include <vector>
 
 #include "daemon/commission/record.hpp"
-#include "estimator/commissioning/earth.hpp"
+
+namespace vibrig::estimator::commissioning {
+struct Description;
+struct EarthRate;
+struct GravityFinding;
+struct Statements;
+}  // namespace vibrig::estimator::commissioning
 
 namespace vibrig::commission {
 
-using estimator::commissioning::Vec3;
-using estimator::commissioning::Verdict;
+using Vec3 = std::array<double, 3>;
 
 inline constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 inline constexpr std::array<const char*, 3> kLoudNames{"OUTER", "INNER", "AZIMUTH"};

@@ -14,6 +14,8 @@
 
 namespace vibrig::commission {
 
+using estimator::commissioning::Verdict;
+
 /// What an earlier daemon kept of a procedure.
 struct Kept {
     Json log = Json::array();

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "daemon/configuration/value.hpp"
-#include "estimator/uncertainty/budget.hpp"
+#include "estimator/uncertainty/inputs_check.hpp"
 
 namespace vibrig::configuration {
 

@@ -14,7 +14,7 @@
 #include "daemon/plan/plan_file.hpp"
 #include "daemon/plan/profile_file.hpp"
 #include "estimator/commissioning/opening.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 
 namespace vibrig::configuration {
 

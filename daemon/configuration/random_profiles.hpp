@@ -9,7 +9,8 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/plan/plan_file.hpp"
-#include "estimator/spectrum/table.hpp"
+#include "estimator/filter/measurement.hpp"
+#include "estimator/spectrum/kind.hpp"
 
 namespace vibrig::configuration {
 

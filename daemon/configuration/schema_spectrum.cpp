@@ -140,9 +140,9 @@ class ProfileReader {
         constexpr Range kPart{-1e3, 1e3};
         const auto value = of.triple({kPart, kPart, kPart}, "");
         if (!value) return;
-        to.direction = {(*value)[0], (*value)[1], (*value)[2]};
-        if (!(to.direction.norm() > 0)) return of.refuse("a direction (north, up, east)");
-        to.direction.normalize();
+        const auto direction = estimator::spectrum::direction_along(*value);
+        if (!direction) return of.refuse("a direction (north, up, east)");
+        to.direction = *direction;
     }
     /// `as`: before "psd".
     [[nodiscard]] bool checked(const Profile& profile, const std::string& as) const {
@@ -189,7 +189,6 @@ void read_profiles(const Entry& entry, C& c) {
 }
 
 std::string write_profile(const C::NamedProfile& one) {
-    const auto& d = one.profile.direction;
     return "{ name = " + write_text(one.profile.name) +
            (one.number > 0 ? ", number = " + std::to_string(one.number) : "") +
            (one.file.empty() || !one.profile.psd.empty() ? ", psd = " + write_pairs(one.profile.psd)
@@ -197,7 +196,7 @@ std::string write_profile(const C::NamedProfile& one) {
            (one.controller_psd.empty() ? ""
                                        : ", controller_psd = " + write_pairs(one.controller_psd)) +
            (one.profile.g_rms > 0 ? ", g_rms = " + write_number(one.profile.g_rms) : "") +
-           ", direction = " + write_triple({d[0], d[1], d[2]}) +
+           ", direction = " + write_triple(one.profile.direction) +
            ", at = " + (one.at_table ? "\"table\"" : "\"platform\"") + " }";
 }
 

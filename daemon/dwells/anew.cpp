@@ -7,6 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "estimator/uncertainty/assessment.hpp"
+
 namespace vibrig::dwells {
 
 namespace {

@@ -4,10 +4,13 @@
 #include <optional>
 #include <string>
 
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/noise/found.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/identification/result.hpp"
-#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig::estimator::uncertainty {
+struct Assessment;
+}
 
 namespace vibrig::dwells {
 
@@ -49,13 +52,6 @@ class Anew {
 [[nodiscard]] estimator::uncertainty::Assessment assess(const estimator::Settings& settings,
                                                         const std::optional<noise::Found>& found,
                                                         const estimator::Result& result);
-
-/// What was shown before a campaign was identified anew.
-struct Live {
-    noise::Found found;
-    estimator::Result result;
-    estimator::uncertainty::Assessment assessed;
-};
 
 /// As a result's JSON has it.
 [[nodiscard]] std::string noise_in_json(const noise::Found& found);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "estimator/allan/dwell_basis.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/dwell_row.hpp"
 

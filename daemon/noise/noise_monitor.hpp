@@ -9,6 +9,7 @@
 
 #include "daemon/domain/events.hpp"
 #include "daemon/domain/positions.hpp"
+#include "daemon/noise/found.hpp"
 #include "daemon/noise/noise_status.hpp"
 #include "daemon/rt/angle_blocks.hpp"
 #include "estimator/allan/dwell_monitor.hpp"
@@ -16,13 +17,6 @@
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::noise {
-
-/// Noise that the data of a whole campaign show, where it is not the configured one.
-struct Found {
-    estimator::NoiseLevels levels;
-    double dof = 0;  ///< 1/2 (N / u(N))^2 of the worst known of its gyros' N
-    bool operator==(const Found&) const = default;
-};
 
 /// Watches the gyros' noise over a campaign: takes the block means of each dwell, lets the drift
 /// model with the newest coefficients leave the residual, compares it with the earlier dwells,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "daemon/noise/noise_monitor.hpp"
+#include "estimator/allan/dwell_basis.hpp"
 #include "estimator/allan/edf.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/dwell_row.hpp"

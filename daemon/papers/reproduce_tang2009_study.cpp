@@ -9,6 +9,7 @@
 #include "daemon/results/progress.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/result.hpp"
 #include "tests/plant/recording.hpp"
@@ -40,7 +41,7 @@ constexpr std::array<Plan, kRoutes> kPlans{{{Method::two_step, {true, true, fals
 
 estimator::Covariance correlation_of(const estimator::Result& result) {
     const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> sigma(result.sigma.data());
-    return sigma.cwiseInverse().asDiagonal() * result.covariance *
+    return sigma.cwiseInverse().asDiagonal() * estimator::mapped(result.covariance) *
            sigma.cwiseInverse().asDiagonal();
 }
 

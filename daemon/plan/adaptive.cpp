@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "daemon/plan/forecast.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"

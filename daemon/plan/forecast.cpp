@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/positions.hpp"

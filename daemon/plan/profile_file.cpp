@@ -109,9 +109,8 @@ StatedProfile read_profile(const std::string& path) {
             !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
             throw std::runtime_error(path + ": direction: found " + found->dump() +
                                      ", expected [north, up, east]");
-        profile.direction = {(*found)[0].get<double>(), (*found)[1].get<double>(),
-                             (*found)[2].get<double>()};
-        if (profile.direction.norm() > 0) profile.direction.normalize();
+        const auto axes = found->get<std::array<double, 3>>();
+        profile.direction = estimator::spectrum::direction_along(axes).value_or(axes);
     }
     if (const auto found = root.find("g_rms"); found != root.end()) {
         if (!found->is_number() || !(found->get<double>() > 0))

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/noise/found.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/records.hpp"
 

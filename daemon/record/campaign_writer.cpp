@@ -8,8 +8,6 @@
 #include <type_traits>
 
 #include "daemon/record/campaign_columns.hpp"
-#include "estimator/filter/parameters.hpp"
-#include "estimator/identification/result.hpp"
 
 namespace vibrig::record {
 
@@ -18,26 +16,6 @@ using hdf5::File;
 using hdf5::Table;
 
 namespace {
-
-DwellNumbers numbers_of(const estimator::DwellRow& row) {
-    constexpr std::size_t kTerms = estimator::kParameters / 3;
-    DwellNumbers numbers;
-    numbers.middle_s = row.middle_s;
-    numbers.sync_arcsec = row.sync_arcsec;
-    numbers.gamma = row.vibration.gamma;
-    for (std::size_t j = 0; j < 3; ++j) {
-        const auto g = static_cast<Eigen::Index>(j);
-        numbers.rate[j] = row.rate[g];
-        numbers.ramp[j] = row.ramp[g];
-        numbers.ramp_sigma[j] = std::sqrt(row.ramp_variance(g, g));
-        for (std::size_t k = 0; k < 3; ++k)
-            numbers.rate_covariance[3 * j + k] = row.variance(g, static_cast<Eigen::Index>(k));
-        for (std::size_t t = 0; t < kTerms; ++t)
-            numbers.rate_regressors[kTerms * j + t] = row.regressors(
-                g, static_cast<Eigen::Index>(estimator::internal_of(kTerms * j + t) / 3));
-    }
-    return numbers;
-}
 
 /// For programs that read no attributes, such as GNU Octave. Numbers of 64 bits are texts: few keep
 /// them whole.
@@ -151,7 +129,7 @@ void CampaignWriter::put(const Played& played) {
 void CampaignWriter::put(const Dwell& dwell) {
     Dwell whole = dwell;
     whole.covariance.resize(estimator::kParameters * estimator::kParameters);
-    put_row(*dwells_, whole, dwell.row ? numbers_of(*dwell.row) : DwellNumbers{});
+    put_row(*dwells_, whole, dwell.numbers);
 }
 
 void CampaignWriter::put(const ConditionRow& row) {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/record/dwell_numbers.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/frame_record.hpp"
 #include "drivers/sample/sample.hpp"
-#include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::record {
@@ -94,8 +94,8 @@ struct Dwell {
     std::string reason;  ///< of the summary's flag
     std::array<double, estimator::kParameters> value{}, sigma{};
     std::array<bool, estimator::kParameters> observable{};
-    std::vector<double> covariance;               ///< 30 x 30, row-major
-    std::optional<estimator::DwellRow> row = {};  ///< none: it was left out
+    std::vector<double> covariance;  ///< 30 x 30, row-major
+    DwellNumbers numbers;
 };
 
 /// How a campaign ended.

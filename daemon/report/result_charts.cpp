@@ -95,8 +95,7 @@ void plot_result(const std::string& path, const estimator::Result& result,
     };
     const auto& p = result.covariance;
     const auto correlation = [&p](std::size_t i, std::size_t j) {
-        const auto r = static_cast<Eigen::Index>(i), c = static_cast<Eigen::Index>(j);
-        return p(r, c) / std::sqrt(p(r, r) * p(c, c));
+        return p[i][j] / std::sqrt(p[i][i] * p[j][j]);
     };
     write("uncertainties.svg", uncertainties);
     write("correlation.svg", correlation_chart(correlation));

@@ -2,24 +2,12 @@
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
-#include <string>
 
+#include "daemon/results/json_values.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
-#include "proto/json_number.hpp"
 
 namespace vibrig::tool {
 
-using proto::number_or_null;
-
-/// null for an empty text.
-[[nodiscard]] inline nlohmann::ordered_json text_or_null(const std::string& text) {
-    return text.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(text);
-}
-[[nodiscard]] nlohmann::ordered_json numbers_or_null(const auto& values) {
-    auto list = nlohmann::ordered_json::array();
-    for (const double value : values) list.push_back(number_or_null(value));
-    return list;
-}
 /// Row by row.
 [[nodiscard]] inline nlohmann::ordered_json matrix_or_null(const Eigen::MatrixXd& of) {
     auto rows = nlohmann::ordered_json::array();

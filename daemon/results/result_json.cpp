@@ -50,8 +50,8 @@ Json covariance(const estimator::Result& result) {
     for (std::size_t i = 0; i < kParameters; ++i) {
         Json row = Json::array();
         for (std::size_t j = 0; j < kParameters; ++j) {
-            row.push_back(number_if(result.observable[i] && result.observable[j],
-                                    result.covariance(static_cast<int>(i), static_cast<int>(j))));
+            row.push_back(
+                number_if(result.observable[i] && result.observable[j], result.covariance[i][j]));
         }
         rows.push_back(std::move(row));
     }

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "daemon/dwells/anew.hpp"
+#include "daemon/dwells/live.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"

@@ -8,6 +8,7 @@
 
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/results/spectrum_text.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
 
@@ -136,12 +137,12 @@ Json held_out_json(const SpectrumResult& of) {
     std::vector<double> errors;
     MatrixXd rates(static_cast<Index>(of.held_out.size()), 3);
     for (const auto& [row, kind] : of.held_out) {
-        rates.row(static_cast<Index>(situations.size())) = row.rate;
+        rates.row(static_cast<Index>(situations.size())) = estimator::mapped(row.rate);
         situations.push_back(
-            {row.angles, level_moment(row.vibration),
+            {estimator::mapped(row.angles), level_moment(row.vibration),
              estimator::spectrum::bands_of(of.analysis.model.frame, row, kind.bands),
              row.duration_s, true});
-        variances.push_back(row.variance);
+        variances.emplace_back(estimator::mapped(row.variance));
         errors.push_back(row.relative_error);
     }
     const Prediction predicted = predict(of.analysis.model, situations);

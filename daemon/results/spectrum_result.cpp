@@ -36,10 +36,9 @@ std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
         rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
         rate.time_h = times.time_h[static_cast<Index>(k)];
         for (std::size_t j = 0; j < 3; ++j) {
-            const auto g = static_cast<Index>(j);
-            rate.rate[j] = row.rate[g];
-            rate.sigma[j] = rate.residual_sigma[j] = std::sqrt(row.variance(g, g));
-            rate.residual[j] = row.rate[g] - model[j][static_cast<Index>(k)];
+            rate.rate[j] = row.rate[j];
+            rate.sigma[j] = rate.residual_sigma[j] = std::sqrt(row.variance[j][j]);
+            rate.residual[j] = row.rate[j] - model[j][static_cast<Index>(k)];
         }
         list.push_back(rate);
     }

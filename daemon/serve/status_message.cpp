@@ -377,8 +377,7 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
                        result.observable[i]);
         google::protobuf::ListValue& row = *out.add_covariance();
         for (std::size_t j = 0; j < estimator::kParameters; ++j) {
-            const double value =
-                result.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+            const double value = result.covariance[i][j];
             google::protobuf::Value& cell = *row.add_values();
             if (result.observable[i] && result.observable[j] && std::isfinite(value)) {
                 cell.set_number_value(value);

@@ -1,5 +1,6 @@
 #include "daemon/study/campaigns.hpp"
 
+#include <Eigen/Core>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -7,9 +8,9 @@
 #include "daemon/dwells/player.hpp"
 #include "daemon/order/campaign_order.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/study/nees.hpp"
 #include "daemon/study/rig_keys.hpp"
 #include "estimator/filter/angles.hpp"
-#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
 
@@ -232,11 +233,6 @@ configuration::Loaded load_settings(const std::vector<Setting>& settings, const 
     } catch (const configuration::ConfigurationError& error) {
         throw StudyError(with_own_places(error.what(), file, settings));
     }
-}
-
-double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
-    if (covariance.rows() != error.size()) return uncertainty::kNone;
-    return estimator::linear_algebra::squared_distance(covariance, error);
 }
 
 std::size_t combination_of(const Study& study, std::uint64_t point) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -55,9 +54,6 @@ class CampaignWorker final : public Worker {
 
 /// What a task takes of a processor, roughly.
 [[nodiscard]] double expected_task_s(const Study& study, const Sequences& sequences);
-
-/// Error squared in units of its covariance; NaN if that is none.
-[[nodiscard]] double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance);
 
 /// Sixteen hexadecimal digits that differ where the last bit of a result would: of a tiny campaign
 /// on this processor, with this library and compiler.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "daemon/study/campaign_record.hpp"
+#include "daemon/study/identified_recording.hpp"
 #include "daemon/study/recordings.hpp"
 #include "daemon/study/statistics.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"

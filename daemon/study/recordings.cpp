@@ -15,6 +15,7 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/campaigns.hpp"
+#include "daemon/study/identified_recording.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "proto/json_number.hpp"

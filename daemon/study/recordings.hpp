@@ -6,10 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/record/replay.hpp"
 #include "daemon/study/study.hpp"
 #include "daemon/study/worker.hpp"
-#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::study {
 
@@ -23,17 +21,6 @@ void check_recordings(const Study& study);
 
 /// The one whose uncertainty is to be proved. Throws StudyError.
 [[nodiscard]] Recording find_recording(const Study& study, const std::string& file);
-
-/// What an identification with the study's settings gives.
-struct IdentifiedRecording {
-    std::string name, serial, state, old_result;
-    estimator::Settings settings;
-    record::ReplayResult replayed;
-    estimator::uncertainty::Assessment assessed;
-};
-/// Throws StudyError if it is not what was planned, else what reading and replaying throw.
-[[nodiscard]] IdentifiedRecording identify_recording(const Recording& recording,
-                                                     const std::vector<Setting>& settings);
 
 /// The recording's settings, with the study's in place of theirs.
 [[nodiscard]] std::string settings_of_recording(const std::string& configuration,

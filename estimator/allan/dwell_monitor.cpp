@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 
+#include "estimator/allan/dwell_basis.hpp"
 #include "estimator/allan/edf.hpp"
+#include "estimator/allan/fit.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -24,11 +26,18 @@ double squared(double x) { return x * x; }
 double walk_of(double n) { return squared(60 * n); }
 double n_of(double walk) { return std::sqrt(walk) / 60; }
 
+Eigen::Map<const VectorXd> mapped(const std::vector<double>& of) {
+    return {of.data(), static_cast<Eigen::Index>(of.size())};
+}
+
+/// Of the contrasts of a dwell, by the angle's noise on its level and the gyro's random walk.
+VectorXd variances(const DwellAngles& dwell, double white, double walk) {
+    return (dwell.white_share * white + walk * dwell.block_s * dwell.basis->walk.array()).matrix();
+}
+
 /// An offset common to all cancels in differences, but not its rounding.
 VectorXd centred(const DwellAngles& dwell) {
-    const Eigen::Map<const VectorXd> angle(dwell.angle_arcsec.data(),
-                                           static_cast<Eigen::Index>(dwell.angle_arcsec.size()));
-    return (angle.array() - angle[0]).matrix();
+    return (mapped(dwell.angle_arcsec).array() - dwell.angle_arcsec[0]).matrix();
 }
 
 /// Variance of averages over m blocks side by side in the longest part without gaps, about the mean
@@ -62,9 +71,10 @@ double scale_of(std::size_t slow_term, double block_s) {
 
 }  // namespace
 
+std::size_t DwellMonitor::tests_of(const DwellBasis& basis) { return basis.octaves.size() + 1; }
+
 std::size_t DwellMonitor::dwells_at(std::size_t level) const {
-    return static_cast<std::size_t>(std::count_if(
-        dwells_.begin(), dwells_.end(), [&](const Kept& kept) { return kept.level == level; }));
+    return static_cast<std::size_t>(std::ranges::count(dwells_, level, &Kept::level));
 }
 
 void DwellMonitor::learn(const DwellAngles& dwell, bool all) {
@@ -77,8 +87,8 @@ void DwellMonitor::learn(const DwellAngles& dwell, bool all) {
     std::vector<double> measured;
     for (const DwellBasis::Octave& octave : dwell.basis->octaves)
         measured.push_back((octave.differences * centred(dwell)).squaredNorm());
-    dwells_.push_back(
-        {dwell, dwell.basis->contrasts(dwell.angle_arcsec), level, std::move(measured)});
+    const VectorXd contrasts = dwell.basis->contrasts(dwell.angle_arcsec);
+    dwells_.push_back({dwell, {contrasts.begin(), contrasts.end()}, level, std::move(measured)});
     if (dwells_.size() > settings_.keep) dwells_.pop_front();
 
     solution_ = solve({});
@@ -97,13 +107,6 @@ void DwellMonitor::learn(const DwellAngles& dwell, bool all) {
     find_smallest_change();
 }
 
-VectorXd DwellMonitor::variances(const Kept& kept, const Solution& solution) const {
-    const DwellAngles& dwell = kept.dwell;
-    return (dwell.white_share * solution.white[kept.level] +
-            solution.walk * dwell.block_s * dwell.basis->walk.array())
-        .matrix();
-}
-
 /// Fisher's scoring. The information matrix is an arrow: each level's white noise meets only q.
 DwellMonitor::Solution DwellMonitor::solve(std::optional<double> fixed_walk) const {
     const std::size_t levels = levels_.size();
@@ -115,12 +118,13 @@ DwellMonitor::Solution DwellMonitor::solve(std::optional<double> fixed_walk) con
         double score_q = 0, qq = 0;
         std::vector<double> score_r(levels, 0), qr(levels, 0), rr(levels, 0);
         for (const Kept& kept : dwells_) {
-            const VectorXd v = variances(kept, s);
+            const VectorXd v = variances(kept.dwell, s.white[kept.level], s.walk);
             const double a = kept.dwell.white_share;
             for (Eigen::Index i = 0; i < v.size(); ++i) {
                 const double b = kept.dwell.block_s * kept.dwell.basis->walk[i];
                 const double weight = 1 / squared(v[i]);
-                const double excess = (squared(kept.contrasts[i]) - v[i]) * weight;
+                const double excess =
+                    (squared(kept.contrasts[static_cast<std::size_t>(i)]) - v[i]) * weight;
                 score_q += excess * b;
                 score_r[kept.level] += excess * a;
                 qq += b * b * weight;
@@ -163,8 +167,9 @@ void DwellMonitor::test_slow_terms(const Solution& solution) {
         double score = 0, tt = 0, tq = 0, qq = 0;
         std::vector<double> tr(levels, 0), qr(levels, 0), rr(levels, 0);
         for (const Kept& kept : dwells_) {
-            const VectorXd weight = variances(kept, solution).cwiseInverse();
-            const VectorXd z = kept.contrasts.cwiseProduct(weight);
+            const VectorXd weight =
+                variances(kept.dwell, solution.white[kept.level], solution.walk).cwiseInverse();
+            const VectorXd z = mapped(kept.contrasts).cwiseProduct(weight);
             const double scale = scale_of(t, kept.dwell.block_s);
             const Eigen::MatrixXd& c = kept.dwell.basis->slow[t];
             const Eigen::MatrixXd& squares = kept.dwell.basis->slow_squares[t];
@@ -201,9 +206,9 @@ void DwellMonitor::test_slow_terms(const Solution& solution) {
 }
 
 /// Bounds of the ratio of an octave to what the earlier dwells of the level let expect.
-std::array<double, 2> DwellMonitor::bounds(const DwellAngles& dwell,
-                                           const DwellBasis::Octave& octave,
+std::array<double, 2> DwellMonitor::bounds(const DwellAngles& dwell, std::size_t number,
                                            std::size_t level) const {
+    const DwellBasis::Octave& octave = dwell.basis->octaves[number];
     const double white = dwell.white_share * solution_.white[level];
     const double walk = solution_.walk * dwell.block_s;
     const double trace = white * octave.white_trace + walk * octave.walk_trace;
@@ -271,7 +276,7 @@ std::vector<Alarm> DwellMonitor::check(const DwellAngles& dwell) const {
         const double expected = dwell.white_share * solution_.white[level] * octave.white_trace +
                                 solution_.walk * dwell.block_s * octave.walk_trace;
         const double ratio = (octave.differences * centred(dwell)).squaredNorm() / expected;
-        const auto [low, high] = bounds(dwell, octave, level);
+        const auto [low, high] = bounds(dwell, i, level);
         if (ratio >= low && ratio <= high) continue;
         const std::size_t part = 3 * i / count;
         alarms.push_back({part == 0   ? Reading::short_tau
@@ -287,11 +292,12 @@ void DwellMonitor::find_smallest_change() {
     const Kept& newest = dwells_.back();
     smallest_change_ = 0;
     if (!terms_[static_cast<std::size_t>(Term::N)].detected) return;
-    for (const DwellBasis::Octave& octave : newest.dwell.basis->octaves) {
+    const auto& octaves = newest.dwell.basis->octaves;
+    for (std::size_t i = 0; i < octaves.size(); ++i) {
         const double white =
-            newest.dwell.white_share * solution_.white[newest.level] * octave.white_trace;
-        const double walk = solution_.walk * newest.dwell.block_s * octave.walk_trace;
-        const double high = bounds(newest.dwell, octave, newest.level)[1];
+            newest.dwell.white_share * solution_.white[newest.level] * octaves[i].white_trace;
+        const double walk = solution_.walk * newest.dwell.block_s * octaves[i].walk_trace;
+        const double high = bounds(newest.dwell, i, newest.level)[1];
         const double change = std::sqrt((high * (white + walk) - white) / walk);
         smallest_change_ = smallest_change_ > 0 ? std::min(smallest_change_, change) : change;
     }

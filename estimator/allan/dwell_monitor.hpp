@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <deque>
@@ -8,11 +7,12 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/allan/dwell_basis.hpp"
-#include "estimator/allan/fit.hpp"
-#include "estimator/allan/monitor.hpp"
+#include "estimator/allan/alarm.hpp"
+#include "estimator/allan/noise_terms.hpp"
 
 namespace vibrig::estimator::allan {
+
+class DwellBasis;
 
 /// Block means of one gyro's angle residual in one dwell; any offset and rate may be left in them.
 struct DwellAngles {
@@ -41,9 +41,7 @@ class DwellMonitor {
 
     /// Tests of one gyro in one dwell: its octaves, and the mean of the dwell, which is not judged
     /// here.
-    [[nodiscard]] static std::size_t tests_of(const DwellBasis& basis) {
-        return basis.octaves.size() + 1;
-    }
+    [[nodiscard]] static std::size_t tests_of(const DwellBasis& basis);
     /// Octaves whose MDEV is not that of the earlier dwells of the same level. Changes nothing.
     [[nodiscard]] std::vector<Alarm> check(const DwellAngles& dwell) const;
     /// `all`: not Q and N alone but all terms and the smallest change, which takes longer.
@@ -67,7 +65,7 @@ class DwellMonitor {
   private:
     struct Kept {
         DwellAngles dwell;
-        Eigen::VectorXd contrasts;
+        std::vector<double> contrasts;
         std::size_t level = 0;
         std::vector<double> measured;  ///< squared differences of each octave, summed
     };
@@ -79,12 +77,11 @@ class DwellMonitor {
         std::vector<double> white_sigma;
     };
     [[nodiscard]] Solution solve(std::optional<double> fixed_walk) const;
-    [[nodiscard]] Eigen::VectorXd variances(const Kept& kept, const Solution& solution) const;
     void test_slow_terms(const Solution& solution);
     void find_smallest_change();
     [[nodiscard]] std::size_t dwells_at(std::size_t level) const;
-    [[nodiscard]] std::array<double, 2> bounds(const DwellAngles& dwell,
-                                               const DwellBasis::Octave& octave,
+    /// Of the dwell's basis the octave of this number.
+    [[nodiscard]] std::array<double, 2> bounds(const DwellAngles& dwell, std::size_t octave,
                                                std::size_t level) const;
 
     DwellMonitorSettings settings_;

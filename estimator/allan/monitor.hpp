@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/allan/alarm.hpp"
 #include "estimator/allan/dynamic.hpp"
 
 namespace vibrig::estimator::allan {
@@ -10,22 +11,6 @@ namespace vibrig::estimator::allan {
 struct MonitorSettings {
     double alpha = 1e-3;                ///< of one window, shared by the octaves and the mean
     std::size_t reference_windows = 5;  ///< that teach the reference when none is given
-};
-
-enum class Reading : unsigned char {
-    short_tau,   ///< quantisation or vibration leakage
-    middle_tau,  ///< angle random walk N
-    long_tau,    ///< temperature, K, R
-    mean_step    ///< the mean of adjacent windows differs
-};
-[[nodiscard]] const char* words_of(Reading reading);
-
-struct Alarm {
-    Reading reading = Reading::middle_tau;
-    double tau = 0;    ///< s; the window's length for a step
-    double ratio = 1;  ///< AVAR over the reference; a step: in standard deviations, signed
-    double limit = 1;  ///< the bound that was crossed
-    double since_s = 0;
 };
 
 /// Compares windows with a reference, octave by octave. Model: the record is one mixture of Q, N,

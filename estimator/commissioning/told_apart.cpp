@@ -5,6 +5,7 @@
 
 #include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {

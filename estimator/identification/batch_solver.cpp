@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/product.hpp"
 #include "estimator/filter/second_moment.hpp"
 
@@ -146,29 +147,31 @@ bool BatchSolver::row(DwellRow& out) noexcept {
     // The start angle is free in the sums; so is the mean drift in what is left for the ramps.
     const Eigen::LLT<Eigen::Matrix3d> rates(n.topLeftCorner<3, 3>());
     if (rates.info() != Eigen::Success) return false;
-    out.variance = rates.solve(Eigen::Matrix3d::Identity());
-    const Eigen::Matrix<double, 3, kColumns> of_rates = out.variance * n.topRows<3>();
+    const Eigen::Matrix3d variance = rates.solve(Eigen::Matrix3d::Identity());
+    const Eigen::Matrix<double, 3, kColumns> of_rates = variance * n.topRows<3>();
     const Eigen::Matrix<double, 3, kColumns> left =
         n.middleRows<3>(kRamps) - n.block<3, 3>(kRamps, 0) * of_rates;
     const Eigen::LLT<Eigen::Matrix3d> ramps(left.middleCols<3>(kRamps));
     if (ramps.info() != Eigen::Success) return false;
-    out.ramp_variance = ramps.solve(Eigen::Matrix3d::Identity());
-    const Eigen::Matrix<double, 3, kColumns> of_ramps = out.ramp_variance * left;
-    out.rate = of_rates.col(kLast);
-    out.ramp = of_ramps.col(kLast);
+    const Eigen::Matrix3d ramp_variance = ramps.solve(Eigen::Matrix3d::Identity());
+    const Eigen::Matrix<double, 3, kColumns> of_ramps = ramp_variance * left;
+    mapped(out.rate) = of_rates.col(kLast);
+    mapped(out.variance) = variance;
+    mapped(out.ramp) = of_ramps.col(kLast);
+    mapped(out.ramp_variance) = ramp_variance;
     for (std::size_t group = 0; group < kGroups; ++group) {
         for (std::size_t j = 0; j < kGyros; ++j) {
-            const auto gyro = static_cast<Eigen::Index>(j), g = static_cast<Eigen::Index>(group);
+            const auto gyro = static_cast<Eigen::Index>(j);
             const auto column = static_cast<Eigen::Index>(internal_index(group, j));
-            out.regressors(gyro, g) = of_rates(gyro, column);
-            out.ramp_regressors(gyro, g) = of_ramps(gyro, column);
+            out.regressors[j][group] = of_rates(gyro, column);
+            out.ramp_regressors[j][group] = of_ramps(gyro, column);
         }
     }
     out.used = readings_;
-    out.angles = first_path_ + path_sum_ / readings_;
+    mapped(out.angles) = first_path_ + path_sum_ / readings_;
     out.middle_s = 0.5 * (first_s_ + last_s_);
     out.duration_s = last_s_ - first_s_;
-    return out.variance.allFinite() && out.ramp_variance.allFinite();
+    return variance.allFinite() && ramp_variance.allFinite();
 }
 
 void BatchSolver::end_dwell(bool keep, double walked) noexcept {

@@ -7,9 +7,9 @@
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_filter.hpp"
-#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/observability.hpp"
+#include "estimator/identification/planned_covariance.hpp"
 
 namespace vibrig::estimator {
 namespace {

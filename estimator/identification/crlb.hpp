@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <vector>
 
@@ -32,11 +31,6 @@ struct PlannedDwell {
 [[nodiscard]] std::array<double, kParameters> predicted_sigma(
     const Settings& settings, const std::vector<PlannedDwell>& plan,
     const std::array<double, kParameters>& nominal, double period_s);
-
-/// Covariance of the coefficients, filter order, that the prior and such a plan leave, for a
-/// nominal platform that does not turn.
-[[nodiscard]] Eigen::Matrix<double, kParameters, kParameters> planned_covariance(
-    const Settings& settings, const std::vector<PlannedDwell>& plan, double period_s);
 
 /// Time between the samples of a recording: the median of the intervals between these stamps, s, so
 /// that lost samples do not stretch it. 0 with fewer than two. Reorders what it is given.

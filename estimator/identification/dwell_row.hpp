@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,7 +16,9 @@ inline constexpr double kAssumedPause_s = 60;
 /// All that one dwell says of the coefficients and of what the model leaves out: the mean drift of
 /// each gyro about its input axis, Earth rate taken out, and how it changes along the dwell.
 struct DwellRow {
-    using Regression = Eigen::Matrix<double, 3, kGroups>;  ///< [gyro][group], filter order
+    using Vector = std::array<double, kGyros>;
+    using Matrix = std::array<Vector, kGyros>;
+    using Regression = std::array<std::array<double, kGroups>, kGyros>;  ///< groups in filter order
 
     int run = 0, position = 0;
     double table_g = -1;  ///< commanded; negative: not known
@@ -24,16 +26,16 @@ struct DwellRow {
     bool common_clock = false;
     bool after_power_loss = false;  ///< the gyros were without power since the row before
     double duration_s = 0;
-    Eigen::Vector3d angles = Eigen::Vector3d::Zero();  ///< gimbals, mean over the dwell, rad
+    std::array<double, 3> angles{};  ///< gimbals, mean over the dwell, rad
     VibrationMoment vibration;
-    double frequency_hz = 0;                         ///< 0 at rest
-    Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< y, deg/h
-    Eigen::Matrix3d variance = Eigen::Matrix3d::Zero();
-    Regression regressors = Regression::Zero();  ///< h as it weighs in `rate`
+    double frequency_hz = 0;  ///< 0 at rest
+    Vector rate{};            ///< y, deg/h
+    Matrix variance{};
+    Regression regressors{};  ///< h as it weighs in `rate`
     /// Ramp of the drift within the dwell, deg/h per 100 s, the mean left free.
-    Eigen::Vector3d ramp = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d ramp_variance = Eigen::Matrix3d::Zero();
-    Regression ramp_regressors = Regression::Zero();
+    Vector ramp{};
+    Matrix ramp_variance{};
+    Regression ramp_regressors{};
     double nis_per_dof = 0, innovation_correlation = 0;
     std::uint32_t used = 0;
     double sync_arcsec = 0;  ///< motion of the angles in step with the vibration

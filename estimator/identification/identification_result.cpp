@@ -229,7 +229,7 @@ Result Identification::Impl::result() const {
         for (std::size_t j = 0; j < kParameters; ++j) {
             const std::size_t b = internal_of(j);
             const bool both = solution.found.observable[a] && solution.found.observable[b];
-            out.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            out.covariance[i][j] =
                 both ? solution.covariance(ka, static_cast<Eigen::Index>(b)) : none;
         }
     }

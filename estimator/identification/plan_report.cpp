@@ -4,8 +4,9 @@
 #include <cstdio>
 #include <limits>
 
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/observability.hpp"
+#include "estimator/identification/planned_covariance.hpp"
 #include "estimator/identification/two_step.hpp"
 
 namespace vibrig::estimator {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -37,10 +36,9 @@ struct Result {
     std::array<double, kParameters> value{};
     std::array<double, kParameters> sigma{};
     std::array<bool, kParameters> observable{};
-    /// 30 x 30, rows in the order of parameter_names(); rows of what is not observable are NaN
+    /// Rows in the order of parameter_names(); rows of what is not observable are NaN
     /// (null in JSON).
-    Eigen::Matrix<double, kParameters, kParameters> covariance =
-        Eigen::Matrix<double, kParameters, kParameters>::Zero();
+    std::array<std::array<double, kParameters>, kParameters> covariance{};
     std::vector<RunAmplitude> amplitudes;
     std::vector<Combination> combinations;
     double nis_per_dof = 0;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::plan {

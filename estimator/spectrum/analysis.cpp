@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/distributions.hpp"
@@ -44,9 +45,9 @@ uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::D
     gyro.variance.resize(n);
     for (Index k = 0; k < n; ++k) {
         const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
-        gyro.rate[k] = dwell.row.rate[g];
+        gyro.rate[k] = dwell.row.rate[j];
         const double level = dwell.relative_error * shaken(k, g);
-        gyro.variance[k] = dwell.row.variance(g, g) + level * level;
+        gyro.variance[k] = dwell.row.variance[j][j] + level * level;
     }
     gyro.regressors = table.grouped(j);
     gyro.prior_information = prior.array().square().inverse();
@@ -125,12 +126,13 @@ MatrixXd joint_covariance(const SpectralTable& table, const std::array<MatrixXd,
     MatrixXd out = declared * declared.transpose();
     for (Index k = 0; k < table.dwells(); ++k) {
         const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
+        const auto variance = mapped(dwell.row.variance);
+        const double error = dwell.relative_error;
         for (Index a = 0; a < 3; ++a) {
             for (Index b = 0; b < 3; ++b) {
                 if (a == b) continue;
                 out(3 * k + a, 3 * k + b) +=
-                    dwell.row.variance(a, b) +
-                    dwell.relative_error * dwell.relative_error * shaken(k, a) * shaken(k, b);
+                    variance(a, b) + error * error * shaken(k, a) * shaken(k, b);
             }
         }
         for (Index i = 0; i < table.dwells(); ++i) {
@@ -333,7 +335,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     if (table.kinds().size() > 1) {
         VectorXd rates(3 * n);
         for (Index k = 0; k < n; ++k)
-            rates.segment<3>(3 * k) = table.rows()[static_cast<std::size_t>(k)].rate;
+            rates.segment<3>(3 * k) = mapped(table.rows()[static_cast<std::size_t>(k)].rate);
         out.flat = test_flatness(
             table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.rates),
             prior, scattered);

@@ -5,7 +5,9 @@
 #include <functional>
 
 #include "estimator/filter/linear_algebra.hpp"
-#include "estimator/identification/identification.hpp"
+#include "estimator/filter/mapped.hpp"
+#include "estimator/filter/settings.hpp"
+#include "estimator/spectrum/profile_moments.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
@@ -133,6 +135,13 @@ bool AxesPsd::stated() const noexcept {
            std::ranges::any_of(cross, [](const auto& points) { return !points.empty(); });
 }
 
+std::optional<std::array<double, 3>> direction_along(const std::array<double, 3>& axes) noexcept {
+    if (!(mapped(axes).norm() > 0)) return {};
+    std::array<double, 3> out{};
+    mapped(out) = mapped(axes).normalized();
+    return out;
+}
+
 void check(const Profile& profile, const std::string& path) {
     if (profile.psd.empty() && profile.sines.empty() && !profile.axes.stated())
         throw SettingsError(path +
@@ -154,9 +163,9 @@ void check(const Profile& profile, const std::string& path) {
     if (!(mean_square(profile) <= kMostRms * kMostRms))
         throw SettingsError(path + "found more than 10000 g rms, expected a vibration");
     check_axes(profile.axes, path);
-    if (!(std::abs(profile.direction.norm() - 1) < 1e-6))
-        throw SettingsError(path + "direction: found a length of " +
-                            text_of(profile.direction.norm()) +
+    const double length = mapped(profile.direction).norm();
+    if (!(std::abs(length - 1) < 1e-6))
+        throw SettingsError(path + "direction: found a length of " + text_of(length) +
                             ", expected a direction (north, up, east)");
     const double rms = std::sqrt(mean_square(profile));
     if (profile.g_rms != 0 && !(std::abs(profile.g_rms / rms - 1) <= 0.01))
@@ -202,7 +211,8 @@ std::vector<Band> bands_of(const Profile& profile, int per_decade) {
 }
 
 std::vector<Eigen::Matrix3d> moments_of(const Profile& profile, int per_decade) {
-    const Eigen::Matrix3d along = profile.direction * profile.direction.transpose();
+    const auto direction = mapped(profile.direction);
+    const Eigen::Matrix3d along = direction * direction.transpose();
     const double all = mean_square(profile);
     std::vector<Eigen::Matrix3d> out;
     for (const Band& band : bands_of(profile, per_decade))

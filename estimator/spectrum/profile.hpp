@@ -1,7 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -30,10 +30,14 @@ struct Profile {
     Breakpoints psd;
     std::vector<std::pair<double, double>> sines;  ///< Hz and g peak
     /// Direction of psd and sines; level frame: north, up, east; of length 1.
-    Eigen::Vector3d direction{0, 1, 0};
+    std::array<double, 3> direction{0, 1, 0};
     double g_rms = 0;   ///< as stated; 0: not
     AxesPsd axes = {};  ///< in place of psd
 };
+
+/// Along these axes, of length 1; none: they have no length.
+[[nodiscard]] std::optional<std::array<double, 3>> direction_along(
+    const std::array<double, 3>& axes) noexcept;
 
 /// Throws SettingsError naming the element, what was found and what was expected. `path` stands
 /// before it, such as "profile.json: ".
@@ -45,8 +49,6 @@ void check(const Profile& profile, const std::string& path = {});
 /// The bands of a profile, with their shares of its mean square: so many for each decade, each with
 /// its exact power, and the sines.
 [[nodiscard]] std::vector<Band> bands_of(const Profile& profile, int per_decade = 800);
-/// The second moment of each of those bands, level frame, g^2.
-[[nodiscard]] std::vector<Eigen::Matrix3d> moments_of(const Profile& profile, int per_decade = 800);
 
 /// B_e: the power of a time T strays by 1 / sqrt(B_e T) of it. Of sines alone 0: it does not.
 [[nodiscard]] double bandwidth_hz(std::span<const Band> bands) noexcept;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimator/spectrum/elastic.hpp"
-#include "estimator/spectrum/sweep.hpp"
+#include "estimator/spectrum/swept_rates.hpp"
 #include "estimator/spectrum/table.hpp"
 
 namespace vibrig::estimator::spectrum {

@@ -4,6 +4,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/spectrum/table.hpp"
 
@@ -197,13 +198,12 @@ Flatness planned_flatness(const SurveyTask& task, const SurveyPlaces& places) {
         if (line != nullptr) kinds.push_back({"", {{line->hz, 1, 0}}});
         for (const std::size_t place : at) {
             SpectralDwell dwell;
-            dwell.row.angles = task.gimbal_rad[place];
-            dwell.row.variance = task.rate_variance * Eigen::Matrix3d::Identity();
+            mapped(dwell.row.angles) = task.gimbal_rad[place];
+            mapped(dwell.row.variance) = task.rate_variance * Eigen::Matrix3d::Identity();
             const Eigen::Matrix3d moment = along_the_vertical(line != nullptr ? line->level_g : 0);
             dwell.row.vibration.kappa = 1 + moment(1, 1);
-            const auto seen = attitude(task.settings, dwell.row.angles, moment);
-            for (std::size_t j = 0; j < kGyros; ++j)
-                dwell.row.regressors.row(static_cast<Index>(j)) = seen.base[j];
+            const auto seen = attitude(task.settings, task.gimbal_rad[place], moment);
+            for (std::size_t j = 0; j < kGyros; ++j) mapped(dwell.row.regressors[j]) = seen.base[j];
             if (line != nullptr) dwell.kind = kinds.size() - 1;
             dwells.push_back(std::move(dwell));
         }

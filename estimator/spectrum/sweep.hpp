@@ -1,14 +1,10 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <limits>
+#include <optional>
 #include <vector>
-
-#include "estimator/filter/settings.hpp"
-#include "estimator/spectrum/elastic.hpp"
-#include "estimator/spectrum/table.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -18,9 +14,9 @@ struct SweepBlock {
     std::array<double, 3> angle_rad{};  ///< mean of the raw encoder angles, without wraps
     std::size_t samples = 0;            ///< of that mean
     double from_hz = 0, to_hz = 0;      ///< at its ends
-    /// Second moment of the vibration's specific force, level frame, g^2; not finite: not known, as
-    /// where a harmonic falls on a multiple of the sampling rate.
-    Eigen::Matrix3d moment = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    /// Second moment of the vibration's specific force, level frame, g^2; none: not known, as where
+    /// a harmonic falls on a multiple of the sampling rate.
+    std::optional<std::array<std::array<double, 3>, 3>> moment = {};
 };
 
 /// A dwell under one sweep, block after block, none left out.
@@ -28,39 +24,10 @@ struct Sweep {
     int run = 0, position = 0;
     std::vector<SweepBlock> blocks;
 
-    [[nodiscard]] std::size_t known() const noexcept;
-};
-
-/// What one gyro's drift over a sweep says of its coefficients: rates between neighbouring blocks,
-/// whitened (docs/theory/spectrum.md, "Sweeps"). Their noise is the gyro's random walk, averaged
-/// over the blocks, and the encoders'; what they have in common may be off by `offset_sigma`,
-/// deg/h, since a bias that walks must not become a spectrum.
-class SweptRates {
-  public:
-    static constexpr double kFree = 1e3;
-    SweptRates(const Settings& settings, const Sweep& sweep, std::size_t gyro,
-               double offset_sigma = kFree);
-
-    [[nodiscard]] Eigen::Index size() const noexcept { return rate_.size(); }
-    [[nodiscard]] const Eigen::VectorXd& rate() const noexcept { return rate_; }  ///< n
-    [[nodiscard]] const Eigen::MatrixXd& base() const noexcept { return base_; }  ///< n x 10
-    /// n x 6: what an elastic part adds to the six quadratic columns.
-    [[nodiscard]] Eigen::MatrixXd elastic(const Resonance& of) const;
-
-  private:
-    struct Seen {
-        std::array<double, 2> hz{};
-        Eigen::Matrix<double, kElastic, 1> vibration;
-    };
-    [[nodiscard]] Eigen::MatrixXd whitened(Eigen::MatrixXd rows) const;
-
-    std::vector<Seen> blocks_;         ///< those that are known
-    std::vector<std::size_t> before_;  ///< of a rate: the block before it, the next is after it
-    Eigen::VectorXd diagonal_,
-        below_;               ///< of the covariance's Cholesky factor, n; below_[i]: row i
-    Eigen::VectorXd common_;  ///< whitened direction of what they have in common, scaled
-    Eigen::VectorXd rate_;
-    Eigen::MatrixXd base_;
+    [[nodiscard]] std::size_t known() const noexcept {
+        return static_cast<std::size_t>(std::ranges::count_if(
+            blocks, [](const SweepBlock& block) { return block.moment.has_value(); }));
+    }
 };
 
 }  // namespace vibrig::estimator::spectrum

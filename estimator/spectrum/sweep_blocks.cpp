@@ -1,10 +1,13 @@
 #include "estimator/spectrum/sweep_blocks.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -27,7 +30,7 @@ bool clear_of_samples(double from_hz, double to_hz, double sample_hz) noexcept {
 }
 
 SweepBlocks::SweepBlocks(const Settings& settings, int run, int position)
-    : settings_(settings), kinematics_(settings_), sweep_{run, position, {}} {}
+    : settings_(settings), sweep_{run, position, {}} {}
 
 void SweepBlocks::add(const Measurement& m, double hz) {
     if (!begun_) begin_s_ = m.time_s;
@@ -40,12 +43,11 @@ void SweepBlocks::add(const Measurement& m, double hz) {
         end_block();
         begin_s_ = m.time_s;
     }
-    Sample sample{m.time_s, hz, Eigen::Vector3d::Zero(), m.force_good};
+    Sample sample{m.time_s, hz, {}, m.force_good};
     for (std::size_t i = 0; i < 3; ++i) {
         for (std::size_t j = 0; j < 3; ++j)
-            sample.force[static_cast<Index>(i)] +=
-                settings_.accelerometer_matrix[i][j] *
-                (m.force_g[j] - settings_.accelerometer_zero_g[j]);
+            sample.force[i] += settings_.accelerometer_matrix[i][j] *
+                               (m.force_g[j] - settings_.accelerometer_zero_g[j]);
         const bool beyond = settings_.accelerometer_range_g > 0 &&
                             std::abs(m.force_g[i]) >= settings_.accelerometer_range_g;
         sample.force_good = sample.force_good && std::isfinite(m.force_g[i]) && !beyond;
@@ -115,7 +117,7 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         const auto i = static_cast<Index>(k);
         root[i] = std::sqrt(window);
         columns.row(i) << 1, std::cos(phase), std::sin(phase);
-        force.row(i) = s.force.transpose();
+        force.row(i) = mapped(s.force);
         sum += window;
     }
     if (!(sum > 0)) return;
@@ -140,8 +142,11 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         settings_.accelerometer_response.power(std::sqrt(block.from_hz * block.to_hz));
     if (seen < kLeastSeen) return;
     moment /= seen;
-    const Pose pose = kinematics_.pose(kinematics_.gimbal_angles(block.angle_rad));
-    block.moment = pose.level.transpose() * moment * pose.level;
+    const Kinematics kinematics(settings_);
+    const Pose pose = kinematics.pose(kinematics.gimbal_angles(block.angle_rad));
+    moment = (pose.level.transpose() * moment * pose.level).eval();
+    if (!moment.allFinite()) return;
+    mapped(block.moment.emplace()) = moment;
 }
 
 }  // namespace vibrig::estimator::spectrum

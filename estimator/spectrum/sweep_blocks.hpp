@@ -1,10 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <vector>
 
-#include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/measurement.hpp"
+#include "estimator/filter/settings.hpp"
 #include "estimator/spectrum/sweep.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -34,14 +35,13 @@ class SweepBlocks {
   private:
     struct Sample {
         double time_s = 0, hz = 0;
-        Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< platform axes, g
+        std::array<double, 3> force{};  ///< platform axes, g
         bool force_good = false;
     };
     void end_block();
     void take_moment(SweepBlock& block);
 
     const Settings settings_;
-    const Kinematics kinematics_;
     Sweep sweep_;
     std::vector<Sample> samples_;  ///< of the block
     std::vector<double> shares_;

@@ -6,6 +6,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -92,9 +93,10 @@ SpectralTable::SpectralTable(const Settings& settings, std::vector<SpectralDwell
             auto bands = bands_of(settings, dwell.row, kinds_[*dwell.kind].bands);
             if (bands.size() > kinds_[*dwell.kind].bands.size()) dwell.bands = std::move(bands);
         }
-        const Attitude at = attitude(settings, dwell.row.angles, level_moment(dwell.row.vibration));
+        const Attitude at =
+            attitude(settings, mapped(dwell.row.angles), level_moment(dwell.row.vibration));
         for (std::size_t j = 0; j < kGyros; ++j) {
-            base_[j].row(i) = dwell.row.regressors.row(static_cast<Index>(j));
+            base_[j].row(i) = mapped(dwell.row.regressors[j]);
             // What happened, not what was to happen.
             if (dwell.row.random) base_[j].row(i) = at.base[j];
             if (dwell.kind) vibration_[j].row(i) = at.vibration[j];

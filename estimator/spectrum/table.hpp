@@ -4,23 +4,14 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/spectrum/elastic.hpp"
+#include "estimator/spectrum/kind.hpp"
 
 namespace vibrig::estimator::spectrum {
-
-/// A vibration that some dwells had in common: a frequency, or a profile.
-struct Kind {
-    std::string profile;  ///< its name; empty: a sine, whose harmonics are bands of their own
-    std::vector<Band> bands;
-
-    /// Strongest line of a sine, centre of the power of a profile, Hz.
-    [[nodiscard]] double hz() const noexcept;
-};
 
 /// A dwell with what it shook with. At rest there is no kind.
 struct SpectralDwell {

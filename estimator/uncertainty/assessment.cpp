@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
@@ -63,8 +64,8 @@ std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) 
 std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& settings) {
     const VectorXd prior = prior_information(settings);
     std::array<GyroRates, 3> gyros;
-    for (Index j = 0; j < 3; ++j) {
-        GyroRates& gyro = gyros[static_cast<std::size_t>(j)];
+    for (std::size_t j = 0; j < kGyros; ++j) {
+        GyroRates& gyro = gyros[j];
         const Index n = table.dwells();
         gyro.time_h = table.time_h;
         gyro.rate.resize(n);
@@ -73,11 +74,11 @@ std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& setti
         for (Index k = 0; k < n; ++k) {
             const DwellRow& row = table.rows[static_cast<std::size_t>(k)];
             gyro.rate[k] = row.rate[j];
-            gyro.variance[k] = row.variance(j, j);
-            gyro.regressors.row(k) = row.regressors.row(j);
+            gyro.variance[k] = row.variance[j][j];
+            gyro.regressors.row(k) = mapped(row.regressors[j]);
         }
         gyro.prior_information.resize(kOfGyro);
-        for (Index g = 0; g < kOfGyro; ++g) gyro.prior_information[g] = prior[3 * g + j];
+        for (Index g = 0; g < kOfGyro; ++g) gyro.prior_information[g] = prior[3 * g + index(j)];
         gyro.breaks = breaks_of(table, settings.drift);
     }
     return gyros;
@@ -283,8 +284,8 @@ void tell_rates(const DwellTable& table, const VectorXd& residual, const VectorX
         rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
         rate.time_h = table.time_h[index(k)];
         for (std::size_t j = 0; j < 3; ++j) {
-            rate.rate[j] = row.rate[index(j)];
-            rate.sigma[j] = std::sqrt(row.variance(index(j), index(j)));
+            rate.rate[j] = row.rate[j];
+            rate.sigma[j] = std::sqrt(row.variance[j][j]);
             rate.residual[j] = residual[index(3 * k + j)];
             rate.residual_sigma[j] = std::sqrt(variance[index(3 * k + j)]);
         }

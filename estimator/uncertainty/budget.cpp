@@ -6,6 +6,7 @@
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/uncertainty/inputs_check.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {

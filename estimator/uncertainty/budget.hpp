@@ -40,8 +40,4 @@ void add_skew(const DwellTable& table, const ForwardModel& model, InputSignature
 [[nodiscard]] Eigen::MatrixXd input_covariance(const Inputs& inputs,
                                                const std::vector<InputSignature>& list);
 
-/// Names that correlations may use, in the order of input_signatures(); throws SettingsError as
-/// input_covariance() does.
-void check(const Inputs& inputs);
-
 }  // namespace vibrig::estimator::uncertainty

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/level/vibration_level.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -37,7 +38,7 @@ std::vector<DwellRow> with_doubtful_levels(const Settings& settings, const Dwell
         if (rows.empty()) rows.assign(table.rows.begin(), table.rows.end());
         const Eigen::Vector3d moved =
             kAmplitude / (2 * kStep) * (model.apparent(row, more) - model.apparent(row, less));
-        rows[k].variance += moved * moved.transpose();
+        mapped(rows[k].variance) += moved * moved.transpose();
     }
     return rows;
 }

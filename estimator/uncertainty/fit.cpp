@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -25,9 +26,10 @@ Eigen::Matrix3d whitening_of(const Eigen::Matrix3d& variance) {
 MatrixXd all_regressors(const DwellTable& table) {
     MatrixXd h = MatrixXd::Zero(3 * table.dwells(), kCoefficients);
     for (Index k = 0; k < table.dwells(); ++k) {
+        const auto regressors = mapped(table.rows[static_cast<std::size_t>(k)].regressors);
         for (Index j = 0; j < 3; ++j) {
             for (Index g = 0; g < kCoefficients / 3; ++g)
-                h(3 * k + j, 3 * g + j) = table.rows[static_cast<std::size_t>(k)].regressors(j, g);
+                h(3 * k + j, 3 * g + j) = regressors(j, g);
         }
     }
     return h;
@@ -36,14 +38,14 @@ MatrixXd all_regressors(const DwellTable& table) {
 VectorXd all_rates(const DwellTable& table) {
     VectorXd y(3 * table.dwells());
     for (Index k = 0; k < table.dwells(); ++k)
-        y.segment<3>(3 * k) = table.rows[static_cast<std::size_t>(k)].rate;
+        y.segment<3>(3 * k) = mapped(table.rows[static_cast<std::size_t>(k)].rate);
     return y;
 }
 
 NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
                  const VectorXd& prior_information, int freed)
     : table_(table), h_(all_regressors(table)), declared_(declared) {
-    for (const auto& row : table_.rows) whitening_.push_back(whitening_of(row.variance));
+    for (const auto& row : table_.rows) whitening_.push_back(whitening_of(mapped(row.variance)));
     MatrixXd columns(h_.rows(), kCoefficients + declared.cols());
     columns << h_, declared;
     white_ = whitened(columns);
@@ -107,7 +109,8 @@ VectorXd NullFit::residual(const VectorXd& coefficients) const {
 VectorXd NullFit::residual_variance(Index declared) const {
     VectorXd variance(h_.rows());
     for (Index k = 0; k < table_.dwells(); ++k)
-        variance.segment<3>(3 * k) = table_.rows[static_cast<std::size_t>(k)].variance.diagonal();
+        variance.segment<3>(3 * k) =
+            mapped(table_.rows[static_cast<std::size_t>(k)].variance).diagonal();
     if (declared > 0) variance += declared_.leftCols(declared).rowwise().squaredNorm();
     const MatrixXd hp = h_ * covariance_;
     variance -= hp.cwiseProduct(h_).rowwise().sum();
@@ -132,11 +135,11 @@ RampFit fit_ramps(const DwellTable& table, const VectorXd& coefficients) {
     std::array<double, 3> weight{}, sum{};
     for (const DwellRow& row : table.rows) {
         for (std::size_t j = 0; j < 3; ++j) {
-            const auto g = static_cast<Index>(j);
-            double off = row.ramp[g];
-            for (Index i = 0; i < kCoefficients / 3; ++i)
-                off -= row.ramp_regressors(g, i) * coefficients[3 * i + g];
-            const double variance = row.ramp_variance(g, g);
+            double off = row.ramp[j];
+            for (std::size_t i = 0; i < kGroups; ++i)
+                off -= row.ramp_regressors[j][i] *
+                       coefficients[static_cast<Index>(internal_index(i, j))];
+            const double variance = row.ramp_variance[j][j];
             fit.chi_square += off * off / variance;
             sum[j] += off / variance;
             weight[j] += 1 / variance;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/second_moment.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -72,7 +73,7 @@ ForwardModel::ForwardModel(const Settings& settings, const ParameterArray& coeff
       azimuth_rad_(settings.azimuth_deg * kRadPerDeg) {}
 
 Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const {
-    const Vector3d theta = row.angles;
+    const Vector3d theta = mapped(row.angles);
     // The true rig.
     const Vector3d earth = earth_rate_reference(kinematics_.level(), latitude_rad_ + d.latitude_rad,
                                                 azimuth_rad_ + d.azimuth_rad);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/uncertainty/fit.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -73,7 +74,7 @@ Freed determine_freed(const Settings& settings, const DwellTable& table, const F
     const VectorXd rates = out.z * found;
     out.rows.assign(table.rows.begin(), table.rows.end());
     for (std::size_t k = 0; k < out.rows.size(); ++k)
-        out.rows[k].rate -= rates.segment<3>(3 * static_cast<Index>(k));
+        mapped(out.rows[k].rate) -= rates.segment<3>(3 * static_cast<Index>(k));
     return out;
 }
 

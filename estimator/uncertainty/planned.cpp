@@ -5,6 +5,7 @@
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/second_moment.hpp"
 #include "estimator/identification/crlb.hpp"
 
@@ -37,20 +38,20 @@ Result planned_result(const Settings& settings, const std::vector<PlannedStop>& 
         row.common_clock = true;
         row.nis_per_dof = 1;
         row.used = static_cast<std::uint32_t>(stop.duration_s / period_s);
-        for (std::size_t k = 0; k < 3; ++k)
-            row.angles[static_cast<Eigen::Index>(k)] = stop.angles_deg[k] * kRadPerDeg;
-        const Pose pose = kinematics.pose(row.angles);
+        for (std::size_t k = 0; k < 3; ++k) row.angles[k] = stop.angles_deg[k] * kRadPerDeg;
+        const Pose pose = kinematics.pose(mapped(row.angles));
         const Regressors h = model.regressors(pose.up, second_moment(pose, row.vibration));
         for (std::size_t j = 0; j < kGyros; ++j) {
-            const auto gyro = static_cast<Eigen::Index>(j);
             for (std::size_t g = 0; g < kGroups; ++g) {
-                row.regressors(gyro, static_cast<Eigen::Index>(g)) = h[g][j];
-                row.rate[gyro] += h[g][j] * truth[internal_index(g, j)];
+                row.regressors[j][g] = h[g][j];
+                row.rate[j] += h[g][j] * truth[internal_index(g, j)];
             }
         }
         const double variance = rate_variance(settings, stop.duration_s, period_s);
-        row.variance = variance * Eigen::Matrix3d::Identity();
-        row.ramp_variance = kRampOverRate * kRampOverRate * row.variance;
+        for (std::size_t j = 0; j < kGyros; ++j) {
+            row.variance[j][j] = variance;
+            row.ramp_variance[j][j] = kRampOverRate * kRampOverRate * variance;
+        }
         DwellSummary dwell;
         dwell.run = row.run;
         dwell.position = row.position;

@@ -18,7 +18,7 @@ constexpr std::array<const char*, 3> kLinear{"I", "S", "O"};  ///< filter order
 
 /// a_i, a_s or a_o of a gyro.
 double linear(const DwellRow& row, std::size_t gyro, std::size_t term) {
-    return row.regressors(static_cast<Index>(gyro), static_cast<Index>(kDi + term));
+    return row.regressors[gyro][kDi + term];
 }
 
 VectorXd step_at(const DwellTable& table, int after_dwell) {

@@ -32,7 +32,7 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/serve/history.hpp"
 #include "daemon/serve/status_json.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/uncertainty/assessment.hpp"

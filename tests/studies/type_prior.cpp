@@ -13,7 +13,7 @@
 #include <random>
 
 #include "daemon/plan/adaptive.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/uncertainty/population.hpp"

@@ -15,6 +15,7 @@
 #include "daemon/tool/recordings/identified.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "proto/json_file.hpp"
@@ -77,8 +78,7 @@ void refuse_fitted(const nlohmann::json& result, const std::vector<HeldOut>& hel
             bool same = true;
             for (std::size_t j = 0; same && j < 3; ++j)
                 same = (*rate)[j].is_number() &&
-                       std::abs((*rate)[j].get<double>() - one.row.rate[static_cast<Index>(j)]) <
-                           kSameRate;
+                       std::abs((*rate)[j].get<double>() - one.row.rate[j]) < kSameRate;
             if (same)
                 throw std::runtime_error(
                     recording + ": found run " + std::to_string(one.row.run) + ", position " +
@@ -120,17 +120,16 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
         const HeldOut& one = found.held_out[static_cast<std::size_t>(k)];
         const estimator::DwellRow& row = one.row;
         // What happened, not what was asked for.
-        held.situations.push_back({row.angles, level_moment(row.vibration),
+        held.situations.push_back({estimator::mapped(row.angles), level_moment(row.vibration),
                                    row.psd > 0 && !one.kind.bands.empty()
                                        ? one.kind.bands
                                        : bands_of(found.settings, row, vibration.bands),
                                    row.duration_s, true});
-        held.rates.row(k) = row.rate;
-        held.variances.push_back(row.variance);
+        held.rates.row(k) = estimator::mapped(row.rate);
+        held.variances.emplace_back(estimator::mapped(row.variance));
         held.relative_errors.push_back(row.relative_error);
         std::array<double, 3> deg{};
-        for (std::size_t i = 0; i < 3; ++i)
-            deg[i] = row.angles[static_cast<Index>(i)] * estimator::kDegPerRad;
+        for (std::size_t i = 0; i < 3; ++i) deg[i] = row.angles[i] * estimator::kDegPerRad;
         held.deg.push_back(deg);
     }
     return held;

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "estimator/spectrum/profile.hpp"
+#include "estimator/spectrum/profile_moments.hpp"
 
 namespace vibrig::tool {
 

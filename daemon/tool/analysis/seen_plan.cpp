@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "estimator/filter/angles.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/level/hann.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/plan/positions.hpp"

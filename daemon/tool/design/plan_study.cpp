@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "daemon/tool/design/plan_terms.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/plan/augmentation.hpp"

@@ -4,7 +4,7 @@
 #include <numeric>
 #include <string_view>
 
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/uncertainty/planned.hpp"

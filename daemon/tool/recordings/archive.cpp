@@ -6,7 +6,7 @@
 
 #include "daemon/archive/trend.hpp"
 #include "daemon/archive/verify.hpp"
-#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"

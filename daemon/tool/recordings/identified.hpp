@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/dwells/anew.hpp"
+#include "daemon/dwells/live.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"

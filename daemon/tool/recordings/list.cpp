@@ -4,7 +4,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
@@ -23,9 +23,6 @@ struct ListOptions {
 };
 
 Json entry_json(const archive::Entry& one) {
-    const auto text_or_null = [](const std::string& text) {
-        return text.empty() ? Json(nullptr) : Json(text);
-    };
     return {{"campaign", one.key},
             {"name", one.name},
             {"started", iso_text(one.started_utc_ns)},

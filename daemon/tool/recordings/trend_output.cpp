@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/plot/chart.hpp"
-#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/identification.hpp"

@@ -7,7 +7,7 @@
 
 #include "daemon/campaign/opening_check.hpp"
 #include "estimator/commissioning/opening.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "tests/plant/platform_model.hpp"
 #include "tests/unit/daemon/campaign/campaign_fixture.hpp"
 

@@ -12,6 +12,8 @@
 #include "daemon/dwells/player.hpp"
 #include "daemon/results/result_json.hpp"
 #include "daemon/rt/estimator_stage.hpp"
+#include "estimator/filter/mapped.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::dwells {
@@ -113,7 +115,7 @@ double nees(const estimator::Result& result, const std::array<double, kParameter
         const auto k = static_cast<Eigen::Index>(i);
         e[k] = (result.value[i] - truth[i]) / result.sigma[i];
     }
-    Eigen::MatrixXd c = result.covariance;
+    Eigen::MatrixXd c = estimator::mapped(result.covariance);
     const Eigen::VectorXd scale = c.diagonal().cwiseSqrt().cwiseInverse();
     c = scale.asDiagonal() * c * scale.asDiagonal();
     return e.dot(c.llt().solve(e));

@@ -201,8 +201,10 @@ std::string of(const estimator::DwellRow& row) {
                     row.position, row.middle_s, row.duration_s, row.frequency_hz, row.held_out,
                     row.random, row.apart, row.flagged, row.psd, row.relative_error);
     for (const double value : row.rate) text += fmt::format(" {:a}", value);
-    for (const double value : row.variance.reshaped()) text += fmt::format(" {:a}", value);
-    for (const double value : row.regressors.reshaped()) text += fmt::format(" {:a}", value);
+    for (const auto& of_gyro : row.variance)
+        for (const double value : of_gyro) text += fmt::format(" {:a}", value);
+    for (const auto& of_gyro : row.regressors)
+        for (const double value : of_gyro) text += fmt::format(" {:a}", value);
     for (const double value : row.ramp) text += fmt::format(" {:a}", value);
     return text + "\n";
 }
@@ -213,7 +215,9 @@ std::string of(const estimator::spectrum::Sweep& sweep) {
         text += fmt::format("{:a} {:a} {:a} {}", block.time_s, block.from_hz, block.to_hz,
                             block.samples);
         for (const double value : block.angle_rad) text += fmt::format(" {:a}", value);
-        for (const double value : block.moment.reshaped()) text += fmt::format(" {:a}", value);
+        if (block.moment)
+            for (const auto& row : *block.moment)
+                for (const double value : row) text += fmt::format(" {:a}", value);
         text += "\n";
     }
     return text;

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "daemon/plan/adaptive.hpp"
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/plan/exact.hpp"

@@ -34,14 +34,12 @@ TEST_F(Parts, HaveTheRowsOfTheirDwellsInTheOrderOfTheCoefficients) {
     ASSERT_EQ(regressors.values.size(), 60U);
     const estimator::DwellRow row = row_of(2);
     for (std::size_t j = 0; j < 3; ++j) {
-        const auto g = static_cast<Eigen::Index>(j);
-        EXPECT_EQ(rate.values.at(3 + j), row.rate[g]);
-        EXPECT_EQ(covariance.values.at(9 + 3 * j + (j + 1) % 3), row.variance(g, (g + 1) % 3));
-        EXPECT_EQ(ramp_sigma.values.at(3 + j), std::sqrt(row.ramp_variance(g, g)));
+        EXPECT_EQ(rate.values.at(3 + j), row.rate[j]);
+        EXPECT_EQ(covariance.values.at(9 + 3 * j + (j + 1) % 3), row.variance[j][(j + 1) % 3]);
+        EXPECT_EQ(ramp_sigma.values.at(3 + j), std::sqrt(row.ramp_variance[j][j]));
         for (std::size_t t = 0; t < 10; ++t) {
-            const auto group =
-                static_cast<Eigen::Index>(estimator::internal_of(10 * j + t) / estimator::kGyros);
-            EXPECT_EQ(regressors.values.at(30 + 10 * j + t), row.regressors(g, group));
+            const std::size_t group = estimator::internal_of(10 * j + t) / estimator::kGyros;
+            EXPECT_EQ(regressors.values.at(30 + 10 * j + t), row.regressors[j][group]);
         }
     }
     EXPECT_EQ(gamma.values.at(6 + 3), row.vibration.gamma[3]);

@@ -10,6 +10,7 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
+#include "estimator/identification/dwell_row.hpp"
 
 namespace vibrig::record {
 
@@ -25,13 +26,13 @@ inline estimator::DwellRow row_of(int position) {
     row.run = 1;
     row.position = position;
     row.middle_s = 100.0 * position;
-    for (Eigen::Index j = 0; j < 3; ++j) {
+    for (std::size_t j = 0; j < 3; ++j) {
         row.rate[j] = 1.0 + static_cast<double>(j);
-        row.ramp_variance(j, j) = 4.0 + static_cast<double>(j);
-        for (Eigen::Index k = 0; k < 3; ++k)
-            row.variance(j, k) = 10.0 + static_cast<double>(3 * j + k);
-        for (Eigen::Index t = 0; t < 10; ++t)
-            row.regressors(j, t) = 100.0 + static_cast<double>(10 * j + t);
+        row.ramp_variance[j][j] = 4.0 + static_cast<double>(j);
+        for (std::size_t k = 0; k < 3; ++k)
+            row.variance[j][k] = 10.0 + static_cast<double>(3 * j + k);
+        for (std::size_t t = 0; t < 10; ++t)
+            row.regressors[j][t] = 100.0 + static_cast<double>(10 * j + t);
     }
     row.vibration.gamma = {0.1, 1, 0.2, 0.3, 0.4, 0.5};
     return row;
@@ -93,7 +94,7 @@ class Parts : public ::testing::Test {
             dwell.summary.run = 1;
             dwell.summary.position = orders[i];
             dwell.summary.samples = 100;
-            if (i > 0) dwell.row = row_of(orders[i]);
+            if (i > 0) dwell.numbers = numbers_of(row_of(orders[i]));
             writer.put(dwell);
         }
         writer.end({state, "", "", "{}", head.utc_ns + kSecond});

@@ -32,7 +32,7 @@ class PlotOfAResult : public ::testing::Test {
         fs::create_directories(folder_);
         result_.observable.fill(true);
         result_.sigma.fill(0.01);
-        result_.covariance.setIdentity();
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) result_.covariance[i][i] = 1;
         assessed_.done = true;
         assessed_.verdict.sentence = "doubtful, because of the moon";
         for (auto& c : assessed_.coefficients) c.u = 0.02;
@@ -72,8 +72,8 @@ TEST_F(PlotOfAResult, NamesAPathThatCannotBeWritten) {
 TEST_F(PlotOfAResult, LeavesAHoleForWhatIsNotDetermined) {
     // GIVEN a result of which one coefficient is not determined, and nothing to assess
     result_.observable[4] = false;
-    result_.covariance.row(4).setConstant(std::nan(""));
-    result_.covariance.col(4).setConstant(std::nan(""));
+    result_.covariance[4].fill(std::nan(""));
+    for (auto& row : result_.covariance) row[4] = std::nan("");
     assessed_ = {};
     // WHEN it is drawn THEN nothing in the picture is no number
     plot_result((folder_ / "all").string(), result_, assessed_);

@@ -22,12 +22,11 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 estimator::Result complete() {
     estimator::Result result;
-    result.covariance.setZero();
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         result.value[i] = 0.1 * static_cast<double>(i) - 1;
         result.sigma[i] = 0.003;
         result.observable[i] = true;
-        result.covariance(static_cast<int>(i), static_cast<int>(i)) = 9e-6;
+        result.covariance[i][i] = 9e-6;
     }
     result.amplitudes.push_back({1, 6.0003, 19.0018, 1e-5, 15.0001});
     result.amplitudes.push_back({2, 0, 1, 1e-5, 0});
@@ -96,7 +95,7 @@ TEST(ResultJson, WhatIsNotObservableOrDoesNotExistIsNullAndNeverNaN) {
     estimator::Result result = complete();
     result.observable[0] = false;
     result.value[0] = 12345.0;
-    result.covariance.row(0).setConstant(kNaN);
+    result.covariance[0].fill(kNaN);
     result.nis_per_dof = kNaN;
     result.combinations.push_back({{{"D_Fx", 1}, {"D_OOx", 19}}, 1.57, 0.004});
     const std::string text = result_json(result);

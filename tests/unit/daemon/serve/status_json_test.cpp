@@ -209,8 +209,8 @@ TEST(StatusJson, LeavesOutWhatIsNotValid) {
 TEST(StatusJson, WritesNullWhereTheCovarianceIsNotDetermined) {
     estimator::Result result = full_result();
     result.observable[0] = false;
-    result.covariance.row(0).setConstant(kNaN);
-    result.covariance.col(0).setConstant(kNaN);
+    result.covariance[0].fill(kNaN);
+    for (auto& row : result.covariance) row[0] = kNaN;
     result.combinations[0].sigma = kNaN;
     const std::string json = parameters_json(result);
     EXPECT_FALSE(carries(json, "NaN")) << json;

@@ -302,18 +302,6 @@ TEST(StudyCampaigns, LearnTheNoiseFromTheDwellsBefore) {
     for (std::size_t i = 0; i < quiet.size(); ++i) EXPECT_GT(noisy[i], 1.08 * quiet[i]) << i;
 }
 
-TEST(StudyCampaigns, HaveNoNeesWithoutACovariance) {
-    const Eigen::VectorXd error = Eigen::VectorXd::Ones(2);
-    Eigen::MatrixXd covariance(2, 2);
-    covariance << 4, 0, 0, 1;
-    EXPECT_NEAR(nees(error, covariance), 1.25, 1e-15);
-    covariance << 1, 2, 2, 1;  // indefinite
-    EXPECT_TRUE(std::isnan(nees(error, covariance)));
-    covariance << 1, 1, 1, 1 - 1e-9;
-    EXPECT_TRUE(std::isnan(nees(error, covariance)));
-    EXPECT_TRUE(std::isnan(nees(error, Eigen::MatrixXd())));
-}
-
 TEST(StudyCampaigns, SayWhatTheyTake) {
     const auto expected = [](const std::string& text) {
         const Study study = parse_study("[study]\nname='a'\nkind='campaigns'\n" + text, "S.toml");

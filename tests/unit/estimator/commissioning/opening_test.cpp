@@ -8,7 +8,7 @@
 #include <functional>
 #include <numbers>
 
-#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "tests/plant/platform_model.hpp"
 #include "tests/plant/random.hpp"
 

@@ -81,10 +81,10 @@ TEST(Apart, ItsRowIsThatOfAFilterOfItsOwn) {
     }
     elsewhere.dwell(alone, apart_at(3, 7, kApart_hz));
     ASSERT_EQ(alone.rows().size(), 1U);
-    for (Eigen::Index j = 0; j < 3; ++j) {
-        const double sigma = std::sqrt(row.variance(j, j));
+    for (std::size_t j = 0; j < 3; ++j) {
+        const double sigma = std::sqrt(row.variance[j][j]);
         EXPECT_NEAR(row.rate[j], alone.rows()[0].rate[j], 0.1 * sigma);
-        EXPECT_NEAR(sigma, std::sqrt(alone.rows()[0].variance(j, j)), 0.01 * sigma);
+        EXPECT_NEAR(sigma, std::sqrt(alone.rows()[0].variance[j][j]), 0.01 * sigma);
     }
 }
 

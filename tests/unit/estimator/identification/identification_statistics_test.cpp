@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/identification/result.hpp"
@@ -67,7 +68,8 @@ Statistics run(std::uint64_t seeds, double duration_s, std::size_t gyro_average 
             s.largest_sigma_error =
                 std::max(s.largest_sigma_error, std::abs(result.sigma[i] / bound[i] - 1));
         }
-        const Covariance correlation = sigma.cwiseInverse().asDiagonal() * result.covariance *
+        const Covariance correlation = sigma.cwiseInverse().asDiagonal() *
+                                       mapped(result.covariance) *
                                        sigma.cwiseInverse().asDiagonal();
         s.nees += error.dot(linear_algebra::covariance_inverse(correlation) * error) / n;
         s.nis += result.nis_per_dof / n;

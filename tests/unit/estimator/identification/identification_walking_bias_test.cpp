@@ -7,6 +7,7 @@
 #include <string>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
@@ -54,10 +55,11 @@ struct Reference {
         };
         for (Index k = 0; k < n; ++k) {
             const DwellRow& row = rows[static_cast<std::size_t>(k)];
-            y.segment<3>(3 * k) = row.rate;
-            covariance.block<3, 3>(3 * k, 3 * k) = row.variance;
+            y.segment<3>(3 * k) = mapped(row.rate);
+            covariance.block<3, 3>(3 * k, 3 * k) = mapped(row.variance);
             for (Index j = 0; j < 3; ++j) {
-                for (Index g = 0; g < 10; ++g) h(3 * k + j, 3 * g + j) = row.regressors(j, g);
+                for (Index g = 0; g < 10; ++g)
+                    h(3 * k + j, 3 * g + j) = mapped(row.regressors)(j, g);
             }
         }
         for (Index k = 0; k < n; ++k) {

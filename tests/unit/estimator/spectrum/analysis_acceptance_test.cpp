@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/level/random_level.hpp"
 #include "estimator/spectrum/analysis.hpp"
 #include "estimator/spectrum/sampling.hpp"
@@ -254,8 +255,7 @@ std::array<std::pair<double, double>, 3> least_sigmas(const Truth& truth, double
                             Eigen::VectorXd::Constant(10, 10)};
         problem.prior_sigma.tail(6).setConstant(1);
         for (Index k = 0; k < 63; ++k)
-            problem.rate[k] =
-                dwells.list[static_cast<std::size_t>(k)].row.rate[static_cast<Index>(j)];
+            problem.rate[k] = dwells.list[static_cast<std::size_t>(k)].row.rate[j];
         const auto fitted = estimates(two_resonances(table, j, problem, f1));
         const auto& [low, high] = std::minmax(fitted.at(0).hz, fitted.at(1).hz,
                                               [](auto& a, auto& b) { return a.mean < b.mean; });
@@ -343,7 +343,7 @@ void expect_drift_is_no_spectrum(unsigned campaigns, bool mixed = true, bool see
                     walk[j] += kind == 0   ? 0.03 * std::sqrt(hours) * normal(random)
                                : kind == 1 ? (i == step ? 0.1 : 0)
                                            : 0.05 * hours;
-                dwells.list[i].row.rate += walk;
+                mapped(dwells.list[i].row.rate) += walk;
             }
             alarms += analyse(undeclared(), SpectralTable(undeclared(), dwells.list, dwells.kinds),
                               Form::flat)
@@ -486,9 +486,8 @@ double error_of_random_dwells(bool budgeted, unsigned campaigns) {
             dwell.relative_error = budgeted ? s : 0;
             Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
             moment(1, 1) = dwell.row.vibration.kappa - 1;
-            const Attitude at = attitude(undeclared(), dwell.row.angles, moment);
-            for (std::size_t j = 0; j < 3; ++j)
-                dwell.row.regressors.row(static_cast<Index>(j)) = at.base[j];
+            const Attitude at = attitude(undeclared(), mapped(dwell.row.angles), moment);
+            for (std::size_t j = 0; j < 3; ++j) mapped(dwell.row.regressors[j]) = at.base[j];
         }
         for (std::size_t k = 0; k < dwells.kinds.size(); ++k) {
             const Profile profile = octave(12 + 15.0 * static_cast<double>(k));

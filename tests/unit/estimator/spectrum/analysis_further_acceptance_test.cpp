@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/level/random_level.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/spectrum/analysis.hpp"
@@ -192,11 +193,11 @@ void expect_verified(unsigned campaigns, double slack) {
         for (std::size_t k = 0; k < 16; ++k) {
             const DwellRow& row = rows[of.fitted + k];
             Situation in = situation_of(profiles[kVerified[k / 4]], {});
-            in.gimbal_rad = row.angles;
+            in.gimbal_rad = mapped(row.angles);
             in.duration_s = of.plan.dwell_s;
             situations.push_back(in);
-            variances.push_back(row.variance);
-            measured.row(static_cast<Index>(k)) = row.rate;
+            variances.emplace_back(mapped(row.variance));
+            measured.row(static_cast<Index>(k)) = mapped(row.rate);
         }
         const std::vector<double> exact(16, 0.0);
         const auto verified = [&] {

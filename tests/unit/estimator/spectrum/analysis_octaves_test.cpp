@@ -5,6 +5,7 @@
 #include <random>
 #include <string>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/analysis.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
 
@@ -43,8 +44,8 @@ Dwells of_octaves(const Truth& truth, double s, std::mt19937_64& random) {
         if (at == kHz.end()) continue;
         const Profile profile = octave(static_cast<std::size_t>(at - kHz.begin()));
         row.random = true;
-        row.rate =
-            drift_of(undeclared(), truth, {row.angles, vertical(9), bands_of(profile, 400), 0});
+        mapped(row.rate) = drift_of(undeclared(), truth,
+                                    {mapped(row.angles), vertical(9), bands_of(profile, 400), 0});
         row.vibration.kappa = 1 + 9 * (1 + s * normal(random));
         dwell.relative_error = s;
     }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "estimator/identification/identification.hpp"
+#include "estimator/spectrum/profile_moments.hpp"
 #include "tests/plant/elasticity.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
 

@@ -30,7 +30,7 @@ Alarms of_scatter(double share, unsigned campaigns) {
         Dwells dwells = dwells_of(undeclared(), truth, plan);
         add_noise(dwells, random);
         for (SpectralDwell& dwell : dwells.list)
-            for (Index j = 0; j < 3; ++j) dwell.row.rate[j] += 0.03 * normal(random);
+            for (double& rate : dwell.row.rate) rate += 0.03 * normal(random);
         const Flatness flat =
             analyse(undeclared(), SpectralTable(undeclared(), dwells.list, dwells.kinds),
                     Form::flat)

@@ -6,6 +6,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::spectrum::testing {
@@ -119,7 +120,7 @@ Dwells dwells_of(const Settings& settings, const Truth& truth,
         row.duration_s = 100;
         row.middle_s = 160 * static_cast<double>(out.list.size()) + 50;
         row.common_clock = true;
-        row.variance = kRateVariance * Eigen::Matrix3d::Identity();
+        mapped(row.variance) = kRateVariance * Eigen::Matrix3d::Identity();
         row.frequency_hz = planned.hz;
         const double moment = planned.hz > 0 ? planned.amplitude_g * planned.amplitude_g / 2 : 0;
         Situation in{{}, vertical(moment), {{planned.hz, 1, 0}}, 0};
@@ -130,13 +131,12 @@ Dwells dwells_of(const Settings& settings, const Truth& truth,
         const Eigen::Vector3d rate =
             model.drift_sign() * drift_of(settings, {}, in) - start.earth_rate;
         in.gimbal_rad += start.m * rate * (50 / kArcsecPerRad);
-        row.angles = in.gimbal_rad;
-        row.rate = drift_of(settings, truth, in);
+        mapped(row.angles) = in.gimbal_rad;
+        mapped(row.rate) = drift_of(settings, truth, in);
         // What the accelerometers say.
         row.vibration.kappa = 1 + moment * planned.gain * planned.gain;
-        const Attitude seen = attitude(settings, row.angles, vertical(row.vibration.kappa - 1));
-        for (std::size_t j = 0; j < kGyros; ++j)
-            row.regressors.row(static_cast<Index>(j)) = seen.base[j];
+        const Attitude seen = attitude(settings, in.gimbal_rad, vertical(row.vibration.kappa - 1));
+        for (std::size_t j = 0; j < kGyros; ++j) mapped(row.regressors[j]) = seen.base[j];
         if (planned.hz > 0) {
             const auto found =
                 std::find_if(out.kinds.begin(), out.kinds.end(),
@@ -152,8 +152,8 @@ Dwells dwells_of(const Settings& settings, const Truth& truth,
 void add_noise(Dwells& dwells, std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     for (SpectralDwell& dwell : dwells.list) {
-        for (Index j = 0; j < 3; ++j)
-            dwell.row.rate[j] += std::sqrt(dwell.row.variance(j, j)) * normal(random);
+        for (std::size_t j = 0; j < 3; ++j)
+            dwell.row.rate[j] += std::sqrt(dwell.row.variance[j][j]) * normal(random);
     }
 }
 

@@ -79,8 +79,7 @@ Sweep sweep_at(const Vec3& deg) {
         block.from_hz = 20 * std::pow(6, k / 300.0);
         block.to_hz = 20 * std::pow(6, (k + 1) / 300.0);
         for (std::size_t i = 0; i < 3; ++i) block.angle_rad[i] = deg[i] * (std::numbers::pi / 180);
-        block.moment = Eigen::Matrix3d::Zero();
-        block.moment(1, 1) = 18;
+        block.moment.emplace()[1][1] = 18;
         sweep.blocks.push_back(block);
     }
     return sweep;

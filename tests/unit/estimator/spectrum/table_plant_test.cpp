@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/table.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/spectrum/from_samples.hpp"
@@ -78,9 +79,9 @@ TEST(SpectrumPlant, AgreesWithTheModelOverTheFrequencies) {
             Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
             moment(1, 1) = 18;
             const Eigen::Vector3d is =
-                drift_of(settings, of_model, {row.angles, moment, {{hz, 1, 0}}, 0});
+                drift_of(settings, of_model, {mapped(row.angles), moment, {{hz, 1, 0}}, 0});
             for (Eigen::Index j = 0; j < 3; ++j)
-                EXPECT_NEAR(row.rate[j], is[j], 2e-4) << hz << " Hz, gyro " << j;
+                EXPECT_NEAR(mapped(row.rate)[j], is[j], 2e-4) << hz << " Hz, gyro " << j;
             EXPECT_NEAR(row.vibration.kappa, 19, 19 * 1e-4) << hz;
         }
     }
@@ -106,9 +107,10 @@ TEST(SpectrumPlant, HarmonicsThatTheSamplesTellAreInTheDrift) {
     const std::vector<Band> alone{{28.3, 1, 0}}, with = bands_of(settings, row, alone);
     ASSERT_EQ(with.size(), 3U);
     const auto error = [&](const std::vector<Band>& bands) {
-        const Eigen::Vector3d is = drift_of(settings, Truth::common(0.5, kSixty),
-                                            {row.angles, level_moment(row.vibration), bands, 0});
-        return (row.rate - is).cwiseAbs().maxCoeff();
+        const Eigen::Vector3d is =
+            drift_of(settings, Truth::common(0.5, kSixty),
+                     {mapped(row.angles), level_moment(row.vibration), bands, 0});
+        return (mapped(row.rate) - is).cwiseAbs().maxCoeff();
     };
     EXPECT_LT(error(with), 4e-4);
     EXPECT_GT(error(alone), 2e-3);
@@ -143,7 +145,7 @@ TEST(SpectrumPlant, AgreesWithTheModelUnderRandomVibration) {
         const auto drift = [&](double moment, const std::vector<Band>& bands) {
             Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
             second(1, 1) = moment;
-            return drift_of(settings, of_model, {row.angles, second, bands, 0});
+            return drift_of(settings, of_model, {mapped(row.angles), second, bands, 0});
         };
         const Eigen::Vector3d still = drift(0, {});
         Eigen::Vector3d variance = Eigen::Vector3d::Zero();
@@ -153,7 +155,8 @@ TEST(SpectrumPlant, AgreesWithTheModelUnderRandomVibration) {
         }
         const Eigen::Vector3d is = drift(all, bands_of(profile));
         for (Eigen::Index j = 0; j < 3; ++j)
-            EXPECT_NEAR(row.rate[j], is[j], std::min(0.0064, 4 * std::sqrt(variance[j]) + 2e-4))
+            EXPECT_NEAR(mapped(row.rate)[j], is[j],
+                        std::min(0.0064, 4 * std::sqrt(variance[j]) + 2e-4))
                 << profile.name << ", gyro " << j;
         // What happened, by 4000 slow samples and a profile whose gain is known to 1 %.
         EXPECT_TRUE(row.random && row.apart);

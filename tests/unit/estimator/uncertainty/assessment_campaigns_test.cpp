@@ -28,7 +28,7 @@ double sign(Random& random) { return random() % 2 == 0 ? 1.0 : -1.0; }
 
 Misdeed step(double size, std::size_t after) {
     return [=](Rows& rows, Random& random) {
-        for (Eigen::Index j = 0; j < 3; ++j) {
+        for (std::size_t j = 0; j < 3; ++j) {
             const double s = size * sign(random);
             for (std::size_t k = after; k < rows.size(); ++k) rows[k].rate[j] += s;
         }
@@ -37,7 +37,7 @@ Misdeed step(double size, std::size_t after) {
 
 Misdeed ramp(double per_hour) {
     return [=](Rows& rows, Random& random) {
-        for (Eigen::Index j = 0; j < 3; ++j) {
+        for (std::size_t j = 0; j < 3; ++j) {
             const double s = per_hour * sign(random);
             for (DwellRow& row : rows) row.rate[j] += s * (row.middle_s - rows[0].middle_s) / 3600;
         }
@@ -46,7 +46,7 @@ Misdeed ramp(double per_hour) {
 
 Misdeed walk(double per_root_hour) {
     return [=](Rows& rows, Random& random) {
-        for (Eigen::Index j = 0; j < 3; ++j) {
+        for (std::size_t j = 0; j < 3; ++j) {
             double bias = 0;
             for (std::size_t k = 1; k < rows.size(); ++k) {
                 const double h = (rows[k].middle_s - rows[k - 1].middle_s) / 3600;
@@ -60,7 +60,7 @@ Misdeed walk(double per_root_hour) {
 Misdeed scatter(double size) {
     return [=](Rows& rows, Random& random) {
         for (DwellRow& row : rows) {
-            for (Eigen::Index j = 0; j < 3; ++j) row.rate[j] += size * gauss(random);
+            for (double& rate : row.rate) rate += size * gauss(random);
         }
     };
 }
@@ -83,8 +83,7 @@ Tally campaigns(const std::vector<estimator::testing::PlannedRow>& plan, const M
         std::array<double, 3> moved{};
         for (std::size_t k = 0; k < rows.size(); ++k) {
             for (std::size_t j = 0; j < 3; ++j) {
-                const auto g = static_cast<Eigen::Index>(j);
-                moved[j] += (rows[k].rate[g] - clean[k].rate[g]) / static_cast<double>(rows.size());
+                moved[j] += (rows[k].rate[j] - clean[k].rate[j]) / static_cast<double>(rows.size());
             }
         }
         add_noise(rows, random);

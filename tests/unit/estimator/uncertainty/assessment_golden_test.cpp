@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "estimator/uncertainty/fit.hpp"
@@ -24,8 +25,8 @@ struct Golden : ::testing::Test {
             rows[i].rate[0] +=
                 0.03 * ((i >= 14 ? 1 : 0) - 0.5) + 0.007 * std::sin(static_cast<double>(i) + 1);
         table = dwell_table(rows);
-        for (Index j = 0; j < 3; ++j) {
-            GyroRates& gyro = gyros[static_cast<std::size_t>(j)];
+        for (std::size_t j = 0; j < 3; ++j) {
+            GyroRates& gyro = gyros[j];
             gyro.time_h = table.time_h;
             gyro.rate.resize(28);
             gyro.variance = VectorXd::Constant(28, estimator::testing::kRateVariance);
@@ -33,7 +34,7 @@ struct Golden : ::testing::Test {
             gyro.prior_information = VectorXd::Zero(10);
             for (Index k = 0; k < 28; ++k) {
                 gyro.rate[k] = rows[static_cast<std::size_t>(k)].rate[j];
-                gyro.regressors.row(k) = rows[static_cast<std::size_t>(k)].regressors.row(j);
+                gyro.regressors.row(k) = mapped(rows[static_cast<std::size_t>(k)].regressors[j]);
             }
         }
         for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <random>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
@@ -29,8 +30,8 @@ Looks look_after_each_dwell(const std::vector<PlannedRow>& plan, double scale, i
         std::mt19937_64 random(first_seed + static_cast<std::uint64_t>(c));
         auto rows = estimator::testing::theory_rows(settings, plan);
         for (DwellRow& row : rows) {
-            row.variance *= scale;
-            row.ramp_variance *= scale;
+            mapped(row.variance) *= scale;
+            mapped(row.ramp_variance) *= scale;
         }
         estimator::testing::add_noise(rows, random);
         Level worst = Level::valid;
@@ -76,7 +77,7 @@ TEST(Looks, WhatIsWrongIsNotValidAsSoonAsTheOddsAreThatOfSoManyLooks) {
     const ForwardModel model(settings, truth);
     const auto off = signatures(Misfit::azimuth, dwell_table(rows), model, 0.007);
     for (std::size_t k = 0; k < rows.size(); ++k)  // 12 arcmin, the class counts in threes
-        rows[k].rate += 4 * off.z.block<3, 1>(static_cast<Eigen::Index>(3 * k), 0);
+        mapped(rows[k].rate) += 4 * off.z.block<3, 1>(static_cast<Eigen::Index>(3 * k), 0);
     int not_valid = 0;
     for (std::size_t n = 12; n < rows.size(); ++n) {
         const Assessment a = assess(

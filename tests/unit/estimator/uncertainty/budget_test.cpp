@@ -7,8 +7,10 @@
 #include <random>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/inputs_check.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -120,7 +122,8 @@ TEST(Budget, ADeclaredLatitudeIsNoMisfit) {
     std::vector<DwellRow> rows = theory_rows(at, balanced(6, 14.0 / 3));
     const Kinematics true_site(at), site(believed);
     for (DwellRow& row : rows)
-        row.rate += true_site.pose(row.angles).earth_rate - site.pose(row.angles).earth_rate;
+        mapped(row.rate) += true_site.pose(mapped(row.angles)).earth_rate -
+                            site.pose(mapped(row.angles)).earth_rate;
     std::mt19937_64 random(5);
     estimator::testing::add_noise(rows, random);
     // WHEN it is declared as 10 arcsec, or as 6 arcmin

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
@@ -27,7 +28,8 @@ struct Freed : ::testing::Test {
         const Signatures of =
             signatures(misfit, dwell_table(clean), ForwardModel(settings, truth), 0.007);
         for (std::size_t k = 0; k < rows.size(); ++k)
-            rows[k].rate += sizes * of.z.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
+            mapped(rows[k].rate) +=
+                sizes * of.z.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
         return rows;
     }
     /// u_A over sigma with a class freed: median and largest of 30.

@@ -5,6 +5,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/second_moment.hpp"
 #include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/result.hpp"
@@ -83,17 +84,16 @@ std::vector<DwellRow> theory_rows(const Settings& settings, const std::vector<Pl
         const Pose at_start = kinematics.pose(start);
         const Eigen::Vector3d rate =
             at_start.m * model.platform_rate(at_start, regressors(at_start), truth.data());
-        row.angles = start + rate * (kDwell_s / 2 / kArcsecPerRad);
-        const Regressors h = regressors(kinematics.pose(row.angles));
+        mapped(row.angles) = start + rate * (kDwell_s / 2 / kArcsecPerRad);
+        const Regressors h = regressors(kinematics.pose(mapped(row.angles)));
         for (std::size_t j = 0; j < kGyros; ++j) {
-            const auto gyro = static_cast<Eigen::Index>(j);
             for (std::size_t g = 0; g < kGroups; ++g) {
-                row.regressors(gyro, static_cast<Eigen::Index>(g)) = h[g][j];
-                row.rate[gyro] += h[g][j] * truth[internal_index(g, j)];
+                row.regressors[j][g] = h[g][j];
+                row.rate[j] += h[g][j] * truth[internal_index(g, j)];
             }
         }
-        row.variance = kRateVariance * Eigen::Matrix3d::Identity();
-        row.ramp_variance = kRampVariance * Eigen::Matrix3d::Identity();
+        mapped(row.variance) = kRateVariance * Eigen::Matrix3d::Identity();
+        mapped(row.ramp_variance) = kRampVariance * Eigen::Matrix3d::Identity();
         rows.push_back(row);
     }
     return rows;
@@ -102,9 +102,9 @@ std::vector<DwellRow> theory_rows(const Settings& settings, const std::vector<Pl
 void add_noise(std::vector<DwellRow>& rows, std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     for (DwellRow& row : rows) {
-        for (Eigen::Index j = 0; j < 3; ++j) {
-            row.rate[j] += std::sqrt(row.variance(j, j)) * normal(random);
-            row.ramp[j] += std::sqrt(row.ramp_variance(j, j)) * normal(random);
+        for (std::size_t j = 0; j < 3; ++j) {
+            row.rate[j] += std::sqrt(row.variance[j][j]) * normal(random);
+            row.ramp[j] += std::sqrt(row.ramp_variance[j][j]) * normal(random);
         }
     }
 }

@@ -1,4 +1,4 @@
-#include "estimator/spectrum/sweep.hpp"
+#include "estimator/spectrum/swept_rates.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -9,6 +9,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
@@ -17,8 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-bool is_known(const SweepBlock& block) { return block.moment.allFinite(); }
 
 /// Mean over a block of what a vibration there sees of an elastic coefficient, less 1. Simpson's
 /// rule over ln f, five points: narrower resonances than the block are no quadratic in it.
@@ -33,10 +32,6 @@ double weight(const std::array<double, 2>& hz, const Resonance& of) {
 
 }  // namespace
 
-std::size_t Sweep::known() const noexcept {
-    return static_cast<std::size_t>(std::ranges::count_if(blocks, is_known));
-}
-
 SweptRates::SweptRates(const Settings& settings, const Sweep& sweep, std::size_t gyro,
                        double offset_sigma) {
     const Kinematics kinematics(settings);
@@ -47,10 +42,10 @@ SweptRates::SweptRates(const Settings& settings, const Sweep& sweep, std::size_t
     std::vector<Eigen::Matrix<double, kBase, 1>> base;
     const SweepBlock* last = nullptr;
     for (const SweepBlock& block : sweep.blocks) {
-        const SweepBlock* const before = std::exchange(last, is_known(block) ? &block : nullptr);
+        const SweepBlock* const before = std::exchange(last, block.moment ? &block : nullptr);
         if (last == nullptr) continue;
         const Vector3d angles = kinematics.gimbal_angles(block.angle_rad);
-        const Attitude at = attitude(settings, angles, block.moment);
+        const Attitude at = attitude(settings, angles, mapped(*block.moment));
         blocks_.push_back({{block.from_hz, block.to_hz}, at.vibration[gyro]});
         base.push_back(at.base[gyro]);
         if (before == nullptr) continue;

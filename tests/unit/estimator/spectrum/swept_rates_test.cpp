@@ -1,4 +1,4 @@
-#include "estimator/spectrum/sweep.hpp"
+#include "estimator/spectrum/swept_rates.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/spectrum/analysis.hpp"
 #include "estimator/spectrum/resonance.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
@@ -36,8 +37,7 @@ Sweep sweep_of(double from_hz, double to_hz, double seconds, double peak_g,
         block.from_hz = hz_at(k);
         block.to_hz = hz_at(k + 1);
         for (std::size_t i = 0; i < 3; ++i) block.angle_rad[i] = deg[i] / kPerRadian;
-        block.moment = Eigen::Matrix3d::Zero();
-        block.moment(1, 1) = peak_g * peak_g / 2;
+        block.moment.emplace()[1][1] = peak_g * peak_g / 2;
         sweep.blocks.push_back(block);
     }
     return sweep;
@@ -136,15 +136,14 @@ TEST(Sweep, WhatIsNotKnownIsLeftOutAndNothingElse) {
     const Settings settings;
     Sweep sweep = sweep_of(20, 120, 100, 6);
     EXPECT_EQ(SweptRates(settings, sweep, 1).size(), 99);
-    const auto nothing = SweepBlock{}.moment;
-    for (const std::size_t k : {0U, 50U, 51U, 60U, 62U, 99U}) sweep.blocks[k].moment = nothing;
+    for (const std::size_t k : {0U, 50U, 51U, 60U, 62U, 99U}) sweep.blocks[k].moment.reset();
     EXPECT_EQ(sweep.known(), 94U);
     const SweptRates swept(settings, sweep, 1);
     // Of 94 in the stretches 1-49, 52-59, 61, 63-98: one rate fewer than blocks in each.
     EXPECT_EQ(swept.size(), 94 - 4);
     EXPECT_TRUE(swept.rate().allFinite() && swept.base().allFinite() &&
                 swept.elastic(testing::kSixty).allFinite());
-    for (SweepBlock& block : sweep.blocks) block.moment = nothing;
+    for (SweepBlock& block : sweep.blocks) block.moment.reset();
     EXPECT_EQ(SweptRates(settings, sweep, 1).size(), 0);
     EXPECT_EQ(SweptRates(settings, {}, 0).size(), 0);
     Sweep back = sweep_of(20, 120, 10, 6);
@@ -240,9 +239,8 @@ struct Campaign {
         problem.prior_sigma.head(4).setConstant(10);
         for (Eigen::Index k = 0; k < n; ++k) {
             const DwellRow& row = table->rows()[static_cast<std::size_t>(k)];
-            problem.rate[k] = row.rate[static_cast<Eigen::Index>(j)];
-            problem.covariance(k, k) =
-                row.variance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
+            problem.rate[k] = row.rate[j];
+            problem.covariance(k, k) = row.variance[j][j];
         }
         for (const Sweep& sweep : sweeps) problem.swept.emplace_back(settings, sweep, j);
         return one_resonance(*table, j, problem);
@@ -299,7 +297,7 @@ void let_drift(const Settings& settings, const testing::Truth& truth, Sweep& swe
     const Pose pose = kinematics.pose(angles);
     std::vector<Eigen::Vector3d> rates;
     for (const SweepBlock& block : sweep.blocks) {
-        const Attitude at = attitude(settings, angles, block.moment);
+        const Attitude at = attitude(settings, angles, mapped(*block.moment));
         Eigen::Vector3d rate;
         for (std::size_t j = 0; j < 3; ++j) {
             double one = 0;

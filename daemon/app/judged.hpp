@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/domain/events.hpp"
+#include "daemon/dwells/live.hpp"
+#include "daemon/results/spectrum_result.hpp"
+#include "estimator/identification/result.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig {
+
+/// What is to be made of the dwells at the end: they are in the journal.
+struct Again {
+    noise::Found found;
+    std::string journal;
+    std::uint64_t configuration_hash = 0;
+};
+
+/// What can be believed of the dwells, or of the same identified anew.
+struct Judged {
+    estimator::uncertainty::Assessment assessed;
+    std::optional<estimator::Result> anew;
+    std::shared_ptr<const dwells::Live> live;           ///< what `anew` replaces
+    std::string not_anew;                               ///< why not, though it should be
+    std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
+};
+
+/// Any thread. `all_rows`: with those apart from the result's.
+[[nodiscard]] Judged judge(const estimator::Settings& settings, const estimator::Result& result,
+                           const std::optional<Again>& again, estimator::uncertainty::Stage stage,
+                           const std::vector<estimator::DwellRow>& all_rows,
+                           const tool::NumberedKinds& profiles,
+                           std::vector<estimator::spectrum::Sweep> sweeps,
+                           const tool::PlayedBands& psds);
+
+[[nodiscard]] Severity severity_of(estimator::uncertainty::Level level);
+
+}  // namespace vibrig
