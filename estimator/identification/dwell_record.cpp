@@ -189,6 +189,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : nominal_hz;
     if (r.samples == 0) {
         flag("no samples", true);
+    } else if (2 * r.locked > r.samples) {
+        flag("the inner gimbal is beyond 80 deg: dwell rejected", true);
     } else if (r.level_samples <= 0) {
         flag("no usable specific force", true);
     } else if (sparse) {
