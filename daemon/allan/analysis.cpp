@@ -260,10 +260,12 @@ AllanAnalysis analyse(const AllanRequest& asked) {
     analysis.missing = series.missing;
     analysis.longest_gap = series.longest_gap;
     if (series.missing > 0) {
+        const auto first =
+            std::ranges::find_if_not(values, [](double v) { return std::isfinite(v); });
         analysis.warnings.push_back(
-            printed("%zu samples are missing (longest gap %zu): no difference spans a gap, degrees "
-                    "of freedom are lowered accordingly",
-                    series.missing, series.longest_gap));
+            printed("%zu samples are missing (the first is sample %td, longest gap %zu): no "
+                    "difference spans a gap, degrees of freedom are lowered accordingly",
+                    series.missing, first - values.begin() + 1, series.longest_gap));
     }
     analysis.points = curve(series, request);
     if (request.fit) {

@@ -27,6 +27,7 @@
 #include "estimator/filter/instruction_set.hpp"
 #include "proto/command_tree.hpp"
 #include "proto/dbc.hpp"
+#include "proto/empty_value.hpp"
 #include "proto/shipped_text.hpp"
 
 namespace {
@@ -234,6 +235,7 @@ int main(int argc, char** argv) {
     app.add_option("--instruction-set", instruction_set,
                    "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
+    vibrig::proto::refuse_empty_values(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(app, kExits);
         return 0;

@@ -64,7 +64,7 @@ std::vector<Key> estimation_keys() {
     const auto rig = part(&C::estimator);
     constexpr Range kPrior{1e-9, 1e6};
     return {
-        number("noise.resolver_arcsec", rig(&E::resolver_arcsec), "arcsec", {0, 3600},
+        number("noise.resolver_arcsec", rig(&E::resolver_arcsec), "arcsec", {1e-6, 3600},
                "resolver noise, 1 sigma per sample"),
         integer("noise.resolver_bits", rig(&E::resolver_bits), "bit", 8, 32,
                 "resolution of one turn"),

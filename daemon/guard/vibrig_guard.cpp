@@ -7,6 +7,7 @@
 
 #include "daemon/guard/guard.hpp"
 #include "proto/command_tree.hpp"
+#include "proto/empty_value.hpp"
 
 namespace {
 
@@ -74,6 +75,7 @@ int main(int argc, char** argv) {
     bool check = false;
     app.add_option("--config", path, "vibrigd's configuration file (TOML)")->required();
     app.add_flag("--check", check, "print what the guard takes from it, and end");
+    vibrig::proto::refuse_empty_values(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(
             app, {{0, "ended, or the configuration is good"},

@@ -181,7 +181,11 @@ std::vector<PlannedRun> runs_from_json(const std::string& text, const std::strin
     try {
         json = Json::parse(text);
     } catch (const Json::exception& error) {
-        throw PlanFileError(path + ": not JSON: " + proto::printable(error.what()));
+        // "[json.exception.parse_error.101] parse error at line 2, column 1: syntax error while .."
+        std::string_view cause = error.what();
+        cause.remove_prefix(cause.find(' ') + 1);
+        throw PlanFileError(path +
+                            ": not JSON: " + proto::printable(cause.substr(0, cause.find(':'))));
     }
     const auto runs = json.find("runs");
     if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "daemon/study/run.hpp"
+#include "proto/empty_value.hpp"
 #include "proto/option_value.hpp"
 
 namespace {
@@ -58,6 +59,7 @@ int main(int argc, char** argv) {
         "A rank that is killed ends the job: start it again, and it goes on.\n"
         "Exit codes: 0 all done, 1 a task failed or it was interrupted, 2 bad usage or input, or "
         "the\nresults cannot be stored.");
+    proto::refuse_empty_values(app);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -189,6 +189,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : nominal_hz;
     if (r.samples == 0) {
         flag("no samples", true);
+    } else if (2 * r.locked > r.samples) {
+        flag("the inner gimbal is beyond 80 deg: dwell rejected", true);
     } else if (r.level_samples <= 0) {
         flag("no usable specific force", true);
     } else if (sparse) {
@@ -208,8 +210,9 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
             "rejected",
             true);
-    } else if (r.info.frequency_hz > 0 && s.frequency_hz > 0 &&
-               std::abs(s.frequency_hz - nominal_hz) > kOffFrequency_hz) {
+    } else if (r.info.frequency_hz > 0 && !random &&
+               (s.frequency_hz > 0 ? std::abs(s.frequency_hz - nominal_hz) > kOffFrequency_hz
+                                   : s.kappa > kShaken)) {
         flag("the vibration is not at its commanded frequency within 0.05 Hz: dwell rejected",
              true);
     } else if (const char* alias =

@@ -28,6 +28,7 @@ struct DwellRecord {
     RandomLevel random_level;                   ///< fed under random vibration
     double least_kappa = 0, largest_kappa = 0;  ///< of the streaming level; 0: none yet
     std::uint32_t stuck = 0;                    ///< samples with a resolver that stands still
+    std::uint32_t locked = 0;                   ///< samples with the inner gimbal beyond 80 deg
     int saturated_axis = -1;                    ///< of the accelerometers; -1: none
     /// Periods from reading to reading, readings with a good force, and readings closer together
     /// than the period: where many are missing, it is not known.

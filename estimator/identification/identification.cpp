@@ -204,6 +204,7 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         active_->filter.begin_dwell();
     }
     Reading reading = prepare(measurement);
+    if (std::abs(reading.angles[1]) > kMaxInnerAngleRad) ++record_.locked;
     if (reading.angles_good && stuck_.stuck(measurement.angle_rad)) {
         reading.angles_good = false;
         ++record_.stuck;

@@ -11,6 +11,7 @@ namespace {
 
 /// Below this kappa - 1 the table is at rest.
 constexpr double kAtRest = 1e-4;
+constexpr double kMostOfIt = 0.5;  ///< share of the mean square
 
 std::size_t samples_in(double seconds, double period_s) noexcept {
     return static_cast<std::size_t>(std::max(1.0, std::round(seconds / period_s)));
@@ -137,7 +138,12 @@ VibrationLevel::Whole VibrationLevel::whole() const noexcept {
 double VibrationLevel::amplitude_g() const noexcept { return std::sqrt(2.0 * (kappa_ - 1.0)); }
 
 double VibrationLevel::frequency_hz() const noexcept {
-    return kappa_ > 1.0 ? fitted().frequency_hz : 0.0;
+    if (!(kappa_ > 1.0)) return 0.0;
+    // The lock-in finds a line near the nominal frequency in whatever it is given: it has to be
+    // most of what vibrates.
+    const Vibration& line = fitted();
+    return line.amplitude * line.amplitude > kMostOfIt * 2.0 * (kappa_ - 1.0) ? line.frequency_hz
+                                                                              : 0.0;
 }
 
 bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s,

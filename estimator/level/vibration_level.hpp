@@ -38,7 +38,7 @@ class VibrationLevel {
     [[nodiscard]] double kappa() const noexcept { return kappa_; }
     /// At the platform, sqrt(2 (kappa - 1)), g.
     [[nodiscard]] double amplitude_g() const noexcept;
-    /// 0 at rest.
+    /// 0 at rest, and where what vibrates is not within some 2 Hz of the nominal frequency.
     [[nodiscard]] double frequency_hz() const noexcept;
     /// Phase, rad, of A1 = a0 sin(w t + phase) with t from the first sample of the window of the
     /// last fit.

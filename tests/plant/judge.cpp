@@ -25,7 +25,9 @@ void judge_one(JudgedCoefficient& c, const Json* entry, double limit) {
         return;
     }
     c.estimate = number_or_nan(*entry, "value");
-    c.sigma = number_or_nan(*entry, "sigma");
+    // Of a result with a budget sigma belongs to value_constant; value's own deviation is u.
+    const double u = number_or_nan(*entry, "u");
+    c.sigma = std::isnan(u) ? number_or_nan(*entry, "sigma") : u;
     c.ratio = (c.estimate - c.truth) / c.sigma;
     const auto observable = entry->find("observable");
     const auto unit = entry->find("unit");

@@ -25,7 +25,9 @@ void add_judge_command(CLI::App& app, int& exit_code) {
         ->required();
     command->add_option("--truth", o->truth,
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
-    command->add_option("--sigma", o->sigma, "largest error in standard deviations")
+    command
+        ->add_option("--sigma", o->sigma,
+                     "largest error in standard deviations: u, or sigma where there is no u")
         ->check(proto::finite(0.1, 1000.0))
         ->capture_default_str();
     command->footer(

@@ -66,7 +66,7 @@ int run_design(const Options& options) {
     const auto roots = levelling::roots(gains, loop.earth);
     const auto declared = declared_within(options, loop);
     if (!options.plot.empty()) {
-        plot::write_file(options.plot, response_chart(options, loop).svg());
+        plot::write_pictures(options.plot, {{"response", response_chart(options, loop).svg()}});
     }
     if (options.json) {
         Json root_list = Json::array();

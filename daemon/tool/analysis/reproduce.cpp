@@ -181,8 +181,6 @@ Json json(const Reproduction& reproduction) {
 
 /// Throws what is wrong with the folder before a study of minutes has run.
 void check_plot(const std::string& folder) {
-    if (folder.empty())
-        throw std::runtime_error("--plot: found \"\", expected a folder for charts");
     if (std::filesystem::exists(folder) && !std::filesystem::is_directory(folder)) {
         throw std::runtime_error("--plot: found " + folder + ", expected a folder for charts");
     }
@@ -244,16 +242,15 @@ void add_reproduce(CLI::App& app, int& exit_code) {
         ->check(CLI::IsMember(names));
     command->add_option("--seeds", options->reproduce.seeds, "Monte-Carlo runs of each study")
         ->check(CLI::Range(std::size_t{2}, std::size_t{100000}));
-    const CLI::Option* plot =
-        command->add_option("--plot", options->reproduce.plot, "folder for charts (SVG)");
+    command->add_option("--plot", options->reproduce.plot, "folder for charts (SVG)");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->footer(
         "Example: vibrig reproduce tang2009 --seeds 32 --plot charts\n"
         "Exit codes: 0 everything agrees, 1 something differs (marked), 2 bad usage.");
-    command->callback([options, plot, &exit_code] {
+    command->callback([options, &exit_code] {
         exit_code = guarded(
             [&] {
-                if (plot->count() > 0) check_plot(options->reproduce.plot);
+                if (!options->reproduce.plot.empty()) check_plot(options->reproduce.plot);
                 return 0;
             },
             "reproduce: ");

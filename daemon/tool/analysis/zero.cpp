@@ -57,6 +57,18 @@ zeros::CalibrationSettings settings_of(const Options& options) {
     return s;
 }
 
+void plot_runs(const std::string& path, const std::vector<zeros::Calibration>& runs) {
+    plot::Pictures pictures;
+    for (const zeros::Calibration& run : runs) {
+        const zeros::CalibrationResult result = run.result();
+        const std::string way =
+            std::string(kAxisLetters[static_cast<std::size_t>(result.upright)]) +
+            (result.inverted ? "-down" : "-up");
+        pictures.emplace_back("zeros-" + way, chart_of(run.trace()).svg());
+    }
+    plot::write_pictures(path, pictures);
+}
+
 /// Of the first calibration, and of all of them together.
 int report(const Options& options, const std::vector<zeros::Calibration>& runs) {
     const zeros::CalibrationSettings s = settings_of(options);
@@ -75,9 +87,7 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
     std::optional<zeros::ZerosApart> apart;
     if (results.size() > 1) apart = zeros::together(results);
     const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
-    if (!options.plot.empty()) {
-        plot::write_file(options.plot, chart_of(runs.front().trace()).svg());
-    }
+    if (!options.plot.empty()) plot_runs(options.plot, runs);
     if (options.json) {
         Json json = result_json(result, seen);
         if (apart) {
@@ -224,7 +234,7 @@ void add_common(CLI::App& command, Options& o) {
     add_number(command, "--vibration-limit", s.vibration_limit_g,
                "g, standard deviation within 1 s (0.01)", kAboveZero, 10);
     command.add_flag("--json", o.json, "print the result as JSON");
-    command.add_option("--plot", o.plot, "an SVG file");
+    command.add_option("--plot", o.plot, "an SVG file, or a folder: one for each way up");
 }
 
 }  // namespace

@@ -56,6 +56,22 @@ TEST(Judge, FailsWhatIsFarMissingNullOrUnobservable) {
     EXPECT_FALSE(judged(perfect(), 0.5).passed);
 }
 
+TEST(Judge, TakesTheDeviationThatBelongsToTheValue) {
+    // GIVEN a result with a budget, whose sigma belongs to value_constant
+    nlohmann::json root = perfect();
+    for (auto& parameter : root["parameters"]) {
+        parameter["value"] = parameter["value"].get<double>() + 0.005;
+        parameter["u"] = 0.002;
+    }
+    // THEN each is 3 u off, not 6 sigma
+    EXPECT_TRUE(judged(root).passed);
+    EXPECT_NEAR(judged(root).coefficients[7].ratio, 3, 1e-9);
+    EXPECT_FALSE(judged(root, 2.9).passed);
+    // AND one without a budget is judged by sigma
+    root["parameters"][7]["u"] = nullptr;
+    EXPECT_FALSE(judged(root).passed);
+}
+
 TEST(Judge, RefusesWhatIsNoResult) {
     for (const char* text :
          {"", "{", "[]", "{}", R"({"parameters": 3})", R"({"parameters": [{"value": 1}]})"}) {

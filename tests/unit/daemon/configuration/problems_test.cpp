@@ -27,6 +27,12 @@ TEST(Errors, NameFileLineColumnKeyFoundAndExpected) {
               "rig.toml:2:16: site.latitude_deg: found 91, expected a number from -90 to 90 deg");
 }
 
+TEST(Errors, BoundsAreThoseOfTheEstimatorToo) {
+    EXPECT_EQ(complaint("[noise]\nresolver_arcsec = 0\n"),
+              "rig.toml:2:19: noise.resolver_arcsec: found 0, expected a number from 1e-06 to 3600 "
+              "arcsec");
+}
+
 TEST(Errors, ComeAllInOneGoInTheOrderOfTheFile) {
     // GIVEN four mistakes, the first of them in a section that the schema has last
     const std::string text =

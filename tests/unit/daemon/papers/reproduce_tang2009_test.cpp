@@ -51,7 +51,8 @@ TEST_F(Reproduce, RefusesAPlaceForChartsBeforeTheStudy) {
     EXPECT_EQ(refusal_of("tang2009 --plot file"),
               "reproduce: --plot: found file, expected a folder for charts\n");
     EXPECT_EQ(refusal_of("tang2009 --plot ''"),
-              "reproduce: --plot: found \"\", expected a folder for charts\n");
+              "--plot: found nothing, expected a value: folder for charts (SVG)\n"
+              "Run with --help for more information.\n");
     EXPECT_NE(refusal_of("tang2009 --plot file/below").find("file/below"), std::string::npos);
 }
 

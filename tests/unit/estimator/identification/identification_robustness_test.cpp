@@ -191,6 +191,17 @@ TEST(Robustness, AnAmplitudeHeldWithinAThirdOfAPerCentIsNotCalledADrift) {
     EXPECT_EQ(flagged(result), 0U);
 }
 
+TEST(Robustness, ADwellWhereTheGimbalsLockIsRefusedForThat) {
+    // GIVEN a dwell with the inner gimbal at 81 deg
+    Identification to{Settings{}};
+    RigSimulator rig(11);
+    rig.spoil = [](const DwellInfo&, int, Measurement& m) { m.angle_rad[1] = 81 * kRad; };
+    const DwellSummary summary = rig.dwell(to, SimulatedDwell{});
+    // THEN the reason is not what follows from it
+    EXPECT_STREQ(summary.reason, "the inner gimbal is beyond 80 deg: dwell rejected");
+    EXPECT_EQ(summary.used, 0U);
+}
+
 TEST(Robustness, ADwellWithMostReadingsMissingIsRefusedForThat) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     // GIVEN 60 and 90 % of the samples lost

@@ -109,6 +109,24 @@ TEST(VibrationLevel, MeetsItsAccuracyAboutTheNominalFrequency) {
     }
 }
 
+TEST(VibrationLevel, ClaimsNoFrequencyThatIsNotThere) {
+    // GIVEN vibrations near the nominal 15 Hz and far from it
+    std::mt19937_64 random(1);
+    for (const double hz : {13.0, 15.0, 17.0, 8.7, 10.3, 11.0, 12.4, 18.2}) {
+        Signal signal;
+        signal.frequency = hz;
+        VibrationLevel level(10, signal.noise, 15);
+        stream(level, signal, 400, random);
+        // THEN one is measured, or none: what the lock-in finds at 15 Hz is not the vibration's
+        if (std::abs(hz - 15) <= 2) {
+            EXPECT_NEAR(level.frequency_hz(), hz, 1e-3);
+        } else {
+            EXPECT_TRUE(level.frequency_hz() == 0 || std::abs(level.frequency_hz() - hz) < 1e-3)
+                << level.frequency_hz() << " for " << hz;
+        }
+    }
+}
+
 TEST(VibrationLevel, GravityCalibratesTheGain) {
     std::mt19937_64 random(21);
     Signal signal;

@@ -32,6 +32,8 @@ TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
     EXPECT_EQ(vibrig("level design --plot response.svg"), 0) << error;
     EXPECT_NE(content("response.svg").find("<svg"), std::string::npos);
     EXPECT_NE(out.find("Routh"), std::string::npos);
+    EXPECT_EQ(vibrig("level design --plot charts"), 0) << error;
+    EXPECT_NE(content("charts/response.svg").find("<svg"), std::string::npos);
     // A tolerance below the noise says no.
     EXPECT_EQ(vibrig("level design --accelerometer-noise 1e-2 --tolerance 0.05"), 1);
     EXPECT_NE(out.find("cannot settle"), std::string::npos);

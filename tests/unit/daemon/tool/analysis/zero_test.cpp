@@ -65,6 +65,11 @@ TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {
     // WHEN the second file is z up too THEN it is not valid, and it is said which
     EXPECT_EQ(vibrig("zero up.csv --down up.csv"), 1) << out;
     EXPECT_NE(out.find("not valid: z down: "), std::string::npos) << out;
+    // AND a folder takes the charts of both
+    std::filesystem::create_directory(folder_ / "charts");
+    EXPECT_EQ(vibrig("zero up.csv --down down.csv --plot charts"), 0) << error;
+    for (const char* const chart : {"charts/zeros-z-up.svg", "charts/zeros-z-down.svg"})
+        EXPECT_NE(content(chart).find("<svg"), std::string::npos) << chart;
     expect_refusal("zero up.csv --down down.csv --inverted", "--inverted");
     expect_refusal("zero up.csv --down none.csv", "none.csv");
 }
