@@ -21,6 +21,8 @@ namespace uncertainty = estimator::uncertainty;
 
 /// The rates of gyro j by what is in force.
 VectorXd modelled(const SpectrumResult& of, std::size_t j) {
+    if (of.analysis.form == Form::groups)
+        return of.table.grouped(j) * of.analysis.groups.value.col(static_cast<Index>(j));
     const Hypothesis& best = of.analysis.gyros[j].list.front();
     return design(of.table, j, best.resonances) * best.x;
 }

@@ -144,6 +144,23 @@ MatrixXd to_ten(const Hypothesis& one, bool resonant, std::span<const Band> band
     return out;
 }
 
+/// Of the groups: what is static, and the quadratic coefficients of the lowest kind of vibration.
+void put_groups(const std::array<uncertainty::DriftAverage, 3>& groups,
+                const MatrixXd& declared_effect, Analysis& out) {
+    const auto all = static_cast<Index>(kParameters);
+    out.value = VectorXd::Zero(all);
+    out.covariance_a = MatrixXd::Zero(all, all);
+    for (Index j = 0; j < 3; ++j) {
+        const uncertainty::DriftAverage& gyro = groups[static_cast<std::size_t>(j)];
+        for (Index a = 0; a < kBase; ++a) {
+            out.value[3 * a + j] = gyro.value[a];
+            for (Index b = 0; b < kBase; ++b)
+                out.covariance_a(3 * a + j, 3 * b + j) = gyro.covariance(a, b);
+        }
+    }
+    out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
+}
+
 /// Mean and covariance of the ten coefficients over a mixture.
 void put_together(const SpectralTable& table, const MatrixXd& declared_effect, Analysis& out) {
     const std::span<const Band> lowest =
@@ -170,16 +187,16 @@ void put_together(const SpectralTable& table, const MatrixXd& declared_effect, A
     out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
 }
 
-/// What the declared inputs do to each gyro's coefficients, and to the 30 together.
-MatrixXd add_effects(const SpectralTable& table, const std::array<GyroProblem, 3>& problems,
-                     const DeclaredRates& declared, Analysis& out) {
+/// What the declared inputs do to each gyro's coefficients, and to the 30 together. `gains`: from
+/// the rates to a gyro's coefficients.
+MatrixXd add_effects(const std::array<MatrixXd, 3>& gains, const DeclaredRates& declared,
+                     Analysis& out) {
     const Index m = declared.rates.cols();
     MatrixXd on_all = MatrixXd::Zero(static_cast<Index>(kParameters), m);
     out.model.effects = declared.effects;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
-        const MatrixXd moved =
-            gain(table, j, problems[j], out.gyros[j].list.front()) * of_gyro(declared.rates, g);
+        const MatrixXd moved = gains[j] * of_gyro(declared.rates, g);
         for (Index i = 0; i < m; ++i) {
             out.model.effects[static_cast<std::size_t>(i)].change[j] = moved.col(i);
             for (Index a = 0; a < kBase; ++a) on_all(3 * a + g, i) = moved(a, i);
@@ -258,7 +275,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     out.groups.value.resize(columns, 3);
     out.groups.sigma.resize(columns, 3);
     std::array<GyroProblem, 3> problems;
-    std::array<MatrixXd, 3> if_flat;
+    std::array<uncertainty::DriftAverage, 3> groups;
+    std::array<MatrixXd, 3> if_flat, gains;
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -266,7 +284,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         // What a level's error does is known once the coefficients are.
         for (int pass = 0; pass < (twice ? 2 : 1); ++pass) {
             const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
-            const auto average = uncertainty::average_drift(gyro, settings.drift);
+            groups[j] = uncertainty::average_drift(gyro, settings.drift);
+            const uncertainty::DriftAverage& average = groups[j];
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
@@ -291,7 +310,14 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
-    put_together(table, add_effects(table, problems, declared, out), out);
+    for (std::size_t j = 0; j < 3; ++j)
+        gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
+                                        : gain(table, j, problems[j], out.gyros[j].list.front());
+    const MatrixXd effect = add_effects(gains, declared, out);
+    if (form == Form::groups)
+        put_groups(groups, effect, out);
+    else
+        put_together(table, effect, out);
     set_reach(settings, table, out);
     if (form == Form::flat && out.flat.alarm)
         out.model.refusal = "quadratic coefficients depend on the frequency, and are taken as flat";

@@ -66,6 +66,18 @@ TEST_F(Predict, TheBudgetSaysWhatWasDeclaredAndHow) {
                 ::testing::MatchesRegex("[0-9]+ Hz"));
 }
 
+TEST_F(Predict, InGroupsACoefficientIsThatAtTheLowestFrequency) {
+    const Ended ended = run("identify survey.csv --spectrum groups --json");
+    ASSERT_EQ(ended.exit_code, 0) << ended.error;
+    const PredictJson found = ended.json();
+    const PredictJson& square = found["parameters"][4];
+    EXPECT_EQ(square["at_hz"], 15);
+    EXPECT_EQ(square["value"], found["spectrum"]["frequencies"][0]["coefficients"][0]);
+    // 0.03, and 6.59 % of the elastic half; over all frequencies it would be 0.02.
+    EXPECT_NEAR(square["value"].get<double>(), 0.030989, 4 * square["u"].get<double>());
+    EXPECT_LT(square["u"], 0.002);
+}
+
 TEST_F(Predict, HeldOutDwellsConfirm) {
     const Ended ended =
         run("predict result.json --profile sine.json --verify held_out.csv --config held.toml "
