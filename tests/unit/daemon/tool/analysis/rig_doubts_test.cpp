@@ -96,6 +96,14 @@ TEST_F(RightKeys, ButTwoGyrosOnOneAxisAreTold) {
                 HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too"));
 }
 
+TEST_F(RightKeys, ButVibrationAlongTheVerticalOnlyWantsTheRestDeclared) {
+    const std::string vertical = "platform.second_moment = \"vertical\"\n";
+    EXPECT_THAT(identify(vertical).second,
+                HasSubstr("platform.second_moment: found \"vertical\" without"));
+    EXPECT_THAT(identify(vertical + "uncertainty.cross_axis = 0.01").second,
+                Not(HasSubstr("second_moment")));
+}
+
 TEST_F(RightKeys, ButTimeInMinutesIsSuspected) {
     ASSERT_EQ(run("awk -F, 'BEGIN{OFS=\",\"} NR==1{for(i=1;i<=NF;++i) if($i==\"time_s\") t=i} "
                   "NR>1{$t=sprintf(\"%.12g\",$t/60)} {print}' rec.csv > m.csv && mv rec.csv s.csv "
