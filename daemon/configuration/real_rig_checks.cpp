@@ -14,8 +14,8 @@ namespace vibrig::configuration {
 
 void CrossCheck::real_rig() {
     registers_stated();
-    if (sound({"platform"})) {
-        for (const auto& doubt : estimator::doubtful_axes(c_.estimator)) {
+    if (sound({"platform", "uncertainty"})) {
+        for (const auto& doubt : estimator::doubtful_keys(c_.estimator)) {
             const auto place = places_.find(doubt.key.substr(0, doubt.key.find('[')));
             problems_.add(place == places_.end() ? Place{} : place->second, doubt.key, doubt.found,
                           doubt.expected);
@@ -66,7 +66,7 @@ void CrossCheck::registers_stated() {
 
 std::vector<std::string> warnings(const Loaded& loaded) {
     std::vector<std::string> all;
-    for (const auto& doubt : estimator::doubtful_axes(loaded.configuration.estimator)) {
+    for (const auto& doubt : estimator::doubtful_keys(loaded.configuration.estimator)) {
         const auto key = doubt.key.substr(0, doubt.key.find('['));
         const auto stated = std::ranges::find(loaded.effective, key, &EffectiveValue::key);
         all.push_back((stated == loaded.effective.end() ? "" : stated->origin + ": ") + doubt.key +

@@ -130,31 +130,39 @@ Key declared(std::string name, std::function<std::span<Declared>(C&)> at, std::s
 Key harmonics() {
     using estimator::uncertainty::Harmonic;
     constexpr const char* kHarmonic = "{ order = .., arcsec = .. }";
-    const auto read_one = [](const Entry& entry) -> std::optional<Harmonic> {
+    const auto read_one = [](const Entry& entry) -> std::optional<std::pair<Harmonic, bool>> {
         const auto* table = entry.node.as_table();
         const auto* order = table == nullptr ? nullptr : table->get_as<std::int64_t>("order");
         const auto* size = table == nullptr ? nullptr : table->get("arcsec");
-        if (order == nullptr || size == nullptr || table->size() != 2 || order->get() < 1 ||
-            order->get() > 1000) {
+        const auto* stated = table == nullptr ? nullptr : table->get_as<bool>("declared");
+        if (order == nullptr || size == nullptr || table->size() != (stated == nullptr ? 2 : 3) ||
+            order->get() < 1 || order->get() > 1000) {
             entry.refuse(std::string(kHarmonic) + ", order from 1 to 1000");
             return std::nullopt;
         }
         const auto arcsec = entry.part(*size, "arcsec").number({0, 3600}, "arcsec");
         if (!arcsec) return std::nullopt;
-        return Harmonic{static_cast<int>(order->get()), *arcsec};
+        return std::pair(Harmonic{static_cast<int>(order->get()), *arcsec},
+                         stated == nullptr || stated->get());
     };
     auto read = [read_one](const Entry& entry, C& c) {
         const auto list = entry.elements(0, 16, kHarmonic, read_one);
         if (!list) return;
-        c.estimator.uncertainty.resolver_harmonics = *list;
-        c.estimator.uncertainty.resolver_harmonics_declared = true;
+        Inputs& inputs = c.estimator.uncertainty;
+        inputs.resolver_harmonics.clear();
+        // No harmonics is a statement, too.
+        inputs.resolver_harmonics_declared = list->empty();
+        for (const auto& [harmonic, stated] : *list) {
+            inputs.resolver_harmonics.push_back(harmonic);
+            inputs.resolver_harmonics_declared |= stated;
+        }
     };
     auto write = [](C& c) {
-        // A default that somebody states is declared from then on.
-        if (!c.estimator.uncertainty.resolver_harmonics_declared) return std::string();
-        return write_list(c.estimator.uncertainty.resolver_harmonics, [](const Harmonic& one) {
+        const Inputs& inputs = c.estimator.uncertainty;
+        const std::string stated = inputs.resolver_harmonics_declared ? "true" : "false";
+        return write_list(inputs.resolver_harmonics, [&stated](const Harmonic& one) {
             return "{ order = " + std::to_string(one.order) +
-                   ", arcsec = " + write_number(one.arcsec) + " }";
+                   ", arcsec = " + write_number(one.arcsec) + ", declared = " + stated + " }";
         });
     };
     return {"uncertainty.resolver_harmonics",

@@ -63,8 +63,8 @@ std::string not_determined(const estimator::Settings& settings,
             gyros += (gyros.empty() ? "" : ", ") + gyro_names(settings, i);
         }
         const bool several = platform.find(',') != std::string::npos;
-        text += (text.empty() ? "" : "; ") + platform + (several ? " not apart" : " not at all") +
-                " (" + gyros + ")";
+        text += (text.empty() ? "" : "; ") + platform + (several ? " apart" : " at all") + " (" +
+                gyros + ")";
     }
     return text;
 }

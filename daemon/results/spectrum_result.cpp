@@ -19,14 +19,19 @@ using estimator::kParameters;
 using namespace estimator::spectrum;
 namespace uncertainty = estimator::uncertainty;
 
+/// The rates of gyro j by what is in force.
+VectorXd modelled(const SpectrumResult& of, std::size_t j) {
+    if (of.analysis.form == Form::groups)
+        return of.table.grouped(j) * of.analysis.groups.value.col(static_cast<Index>(j));
+    const Hypothesis& best = of.analysis.gyros[j].list.front();
+    return design(of.table, j, best.resonances) * best.x;
+}
+
 /// The rates of all dwells, with what is left of them.
 std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
     std::vector<uncertainty::DwellRate> list;
     std::array<VectorXd, 3> model;
-    for (std::size_t j = 0; j < 3; ++j) {
-        const Hypothesis& best = of.analysis.gyros[j].list.front();
-        model[j] = design(of.table, j, best.resonances) * best.x;
-    }
+    for (std::size_t j = 0; j < 3; ++j) model[j] = modelled(of, j);
     const auto times = uncertainty::dwell_table(of.table.rows());
     for (std::size_t k = 0; k < of.table.list().size(); ++k) {
         const estimator::DwellRow& row = of.table.list()[k].row;
@@ -64,9 +69,10 @@ void tell_coefficients(const Analysis& of, uncertainty::Assessment& to) {
         for (const Effect& effect : of.model.effects) {
             const double change = effect.change[internal % estimator::kGyros]
                                                [static_cast<Index>(internal / estimator::kGyros)];
-            // Per standard uncertainty.
-            c.budget.push_back({effect.input, effect.element, change, 1, std::abs(change),
-                                uncertainty::Shape::normal, infinite, true});
+            const uncertainty::Declared& d = effect.declared;
+            const double sensitivity = d.u > 0 ? change / d.u : 0;
+            c.budget.push_back({effect.input, effect.element, sensitivity, d.u, std::abs(change),
+                                d.shape, d.dof, d.declared});
         }
         std::stable_sort(c.budget.begin(), c.budget.end(), [](const auto& x, const auto& y) {
             return x.contribution > y.contribution;

@@ -1,5 +1,6 @@
 #include "estimator/filter/settings_check.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <sstream>
@@ -97,10 +98,12 @@ void check(const Settings& s) {
     require(positive(s.gate_nis), "estimator.gate_nis", s.gate_nis, "above 0");
 }
 
-std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
+namespace {
+
+std::vector<DoubtfulKey> doubtful_axes(const Settings& settings) {
     constexpr std::array kKeys{"platform.gyro_x_axes", "platform.gyro_y_axes",
                                "platform.gyro_z_axes"};
-    std::vector<DoubtfulAxes> doubts;
+    std::vector<DoubtfulKey> doubts;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto& axes = settings.gyro_axes[j];
         const std::string gyro(1, "xyz"[j]), key = kKeys[j];
@@ -125,6 +128,20 @@ std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
         doubts.push_back(
             {key, found + " left-handed", "a right-handed triad: input cross output is spin"});
     }
+    return doubts;
+}
+
+}  // namespace
+
+std::vector<DoubtfulKey> doubtful_keys(const Settings& settings) {
+    std::vector<DoubtfulKey> doubts = doubtful_axes(settings);
+    const auto& across = settings.uncertainty.cross_axis;
+    if (settings.second_moment == SecondMoment::vertical &&
+        std::ranges::none_of(across, [](const auto& share) { return share.declared; }))
+        doubts.push_back(
+            {"platform.second_moment", "\"vertical\" without uncertainty.cross_axis",
+             "uncertainty.cross_axis declared, north and east: what the accelerometers "
+             "do not measure"});
     return doubts;
 }
 

@@ -8,7 +8,7 @@
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
-#include "estimator/uncertainty/budget.hpp"
+#include "estimator/spectrum/declared_rates.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/drift_states.hpp"
 #include "estimator/uncertainty/signatures.hpp"
@@ -62,53 +62,6 @@ VectorXd vibration_part(const SpectralTable& table, std::size_t j, const VectorX
         if (!kind) continue;
         const Index begin = kBase - kElastic + kElastic * static_cast<Index>(*kind);
         out[k] = table.vibration(j).row(k).dot(groups.segment(begin, kElastic));
-    }
-    return out;
-}
-
-struct Declared {
-    MatrixXd rates;  ///< 3 n x m, one standard uncertainty each
-    std::vector<std::pair<std::string, std::string>> names;
-};
-
-/// The declared inputs' effect on the rates, correlations worked in.
-Declared declared_of(const Settings& settings, const SpectralTable& table, const MatrixXd& groups,
-                     const MatrixXd& shaken) {
-    const uncertainty::DwellTable times = uncertainty::dwell_table(table.rows());
-    ParameterArray coefficients{};
-    for (std::size_t g = 0; g < kGroups; ++g) {
-        for (std::size_t j = 0; j < kGyros; ++j)
-            coefficients[internal_index(g, j)] =
-                groups(static_cast<Index>(g), static_cast<Index>(j));
-    }
-    uncertainty::InputSignatures inputs = uncertainty::input_signatures(
-        settings.uncertainty, times, uncertainty::ForwardModel(settings, coefficients));
-    VectorXd of_vibration(3 * table.dwells());
-    for (Index k = 0; k < table.dwells(); ++k)
-        of_vibration.segment<3>(3 * k) = shaken.row(k).transpose();
-    // What a gain does depends on the coefficients at the frequency of each dwell.
-    for (std::size_t i = 0; i < inputs.list.size(); ++i) {
-        if (inputs.list[i].input == "accelerometer_gain")
-            inputs.rates.col(static_cast<Index>(i)) = -2 * of_vibration;
-    }
-    const MatrixXd u = uncertainty::input_covariance(settings.uncertainty, inputs.list);
-    Declared out;
-    out.rates = inputs.rates * linear_algebra::padded_root(u);
-    for (const auto& input : inputs.list) out.names.emplace_back(input.input, input.element);
-    const double between = settings.uncertainty.gain_between_frequencies.u;
-    if (table.kinds().size() < 2 || !(between > 0)) return out;
-    for (std::size_t kind = 0; kind < table.kinds().size(); ++kind) {
-        VectorXd z = VectorXd::Zero(of_vibration.size());
-        for (Index k = 0; k < table.dwells(); ++k) {
-            if (table.list()[static_cast<std::size_t>(k)].kind == kind)
-                z.segment<3>(3 * k) = 2 * between * of_vibration.segment<3>(3 * k);
-        }
-        out.rates.conservativeResize(Eigen::NoChange, out.rates.cols() + 1);
-        out.rates.rightCols<1>() = z;
-        out.names.emplace_back("gain_between_frequencies",
-                               table.kinds()[kind].profile.empty()
-                                   ? std::to_string(table.kinds()[kind].hz()) + " Hz"
-                                   : table.kinds()[kind].profile);
     }
     return out;
 }
@@ -193,6 +146,23 @@ MatrixXd to_ten(const Hypothesis& one, bool resonant, std::span<const Band> band
     return out;
 }
 
+/// Of the groups: what is static, and the quadratic coefficients of the lowest kind of vibration.
+void put_groups(const std::array<uncertainty::DriftAverage, 3>& groups,
+                const MatrixXd& declared_effect, Analysis& out) {
+    const auto all = static_cast<Index>(kParameters);
+    out.value = VectorXd::Zero(all);
+    out.covariance_a = MatrixXd::Zero(all, all);
+    for (Index j = 0; j < 3; ++j) {
+        const uncertainty::DriftAverage& gyro = groups[static_cast<std::size_t>(j)];
+        for (Index a = 0; a < kBase; ++a) {
+            out.value[3 * a + j] = gyro.value[a];
+            for (Index b = 0; b < kBase; ++b)
+                out.covariance_a(3 * a + j, 3 * b + j) = gyro.covariance(a, b);
+        }
+    }
+    out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
+}
+
 /// Mean and covariance of the ten coefficients over a mixture.
 void put_together(const SpectralTable& table, const MatrixXd& declared_effect, Analysis& out) {
     const std::span<const Band> lowest =
@@ -219,20 +189,16 @@ void put_together(const SpectralTable& table, const MatrixXd& declared_effect, A
     out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
 }
 
-/// What the declared inputs do to each gyro's coefficients, and to the 30 together.
-MatrixXd add_effects(const SpectralTable& table, const std::array<GyroProblem, 3>& problems,
-                     const Declared& declared, Analysis& out) {
+/// What the declared inputs do to each gyro's coefficients, and to the 30 together. `gains`: from
+/// the rates to a gyro's coefficients.
+MatrixXd add_effects(const std::array<MatrixXd, 3>& gains, const DeclaredRates& declared,
+                     Analysis& out) {
     const Index m = declared.rates.cols();
     MatrixXd on_all = MatrixXd::Zero(static_cast<Index>(kParameters), m);
-    out.model.effects.resize(static_cast<std::size_t>(m));
-    for (Index i = 0; i < m; ++i) {
-        Effect& effect = out.model.effects[static_cast<std::size_t>(i)];
-        std::tie(effect.input, effect.element) = declared.names[static_cast<std::size_t>(i)];
-    }
+    out.model.effects = declared.effects;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
-        const MatrixXd moved =
-            gain(table, j, problems[j], out.gyros[j].list.front()) * of_gyro(declared.rates, g);
+        const MatrixXd moved = gains[j] * of_gyro(declared.rates, g);
         for (Index i = 0; i < m; ++i) {
             out.model.effects[static_cast<std::size_t>(i)].change[j] = moved.col(i);
             for (Index a = 0; a < kBase; ++a) on_all(3 * a + g, i) = moved(a, i);
@@ -311,7 +277,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     out.groups.value.resize(columns, 3);
     out.groups.sigma.resize(columns, 3);
     std::array<GyroProblem, 3> problems;
-    std::array<MatrixXd, 3> if_flat;
+    std::array<uncertainty::DriftAverage, 3> groups;
+    std::array<MatrixXd, 3> if_flat, gains;
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -319,7 +286,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         // What a level's error does is known once the coefficients are.
         for (int pass = 0; pass < (twice ? 2 : 1); ++pass) {
             const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
-            const auto average = uncertainty::average_drift(gyro, settings.drift);
+            groups[j] = uncertainty::average_drift(gyro, settings.drift);
+            const uncertainty::DriftAverage& average = groups[j];
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
@@ -331,7 +299,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
                     covariance_if_flat(gyro, average, table.base(j), prior.col(g), settings.drift);
         }
     }
-    const Declared declared = declared_of(settings, table, out.groups.value, out.vibration_rates);
+    const DeclaredRates declared =
+        declared_rates(settings, table, out.groups.value, out.vibration_rates);
     if (table.kinds().size() > 1) {
         VectorXd rates(3 * n);
         for (Index k = 0; k < n; ++k)
@@ -343,7 +312,14 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
-    put_together(table, add_effects(table, problems, declared, out), out);
+    for (std::size_t j = 0; j < 3; ++j)
+        gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
+                                        : gain(table, j, problems[j], out.gyros[j].list.front());
+    const MatrixXd effect = add_effects(gains, declared, out);
+    if (form == Form::groups)
+        put_groups(groups, effect, out);
+    else
+        put_together(table, effect, out);
     set_reach(settings, table, out);
     if (form == Form::flat && out.flat.alarm)
         out.model.refusal = "quadratic coefficients depend on the frequency, and are taken as flat";

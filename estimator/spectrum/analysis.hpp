@@ -28,7 +28,7 @@ struct Analysis {
     Eigen::MatrixXd vibration_rates;  ///< of the dwells, due to their vibration, n x 3, deg/h
     /// Of all 30 together, filter order: noise and drift states, and with the declared inputs.
     /// Means over a gyro's whole mixture: of the static coefficients where a resonance is the
-    /// likelier, else of those under the lowest kind of vibration.
+    /// likelier, else of those under the lowest kind of vibration; in groups those of the lowest.
     Eigen::VectorXd value;
     Eigen::MatrixXd covariance_a, covariance;
 

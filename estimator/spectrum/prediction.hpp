@@ -15,6 +15,7 @@ namespace vibrig::estimator::spectrum {
 struct Effect {
     std::string input, element;
     std::array<Eigen::VectorXd, 3> change;
+    uncertainty::Declared declared = {};
 };
 
 /// All that a prediction needs of a campaign.

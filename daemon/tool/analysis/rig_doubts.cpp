@@ -27,7 +27,7 @@ bool is_apart(const estimator::DwellSummary& dwell, const std::vector<estimator:
 
 std::string RigDoubts::tell(estimator::Result& result,
                             const std::vector<estimator::DwellRow>& rows) const {
-    for (const auto& doubt : estimator::doubtful_axes(settings_))
+    for (const auto& doubt : estimator::doubtful_keys(settings_))
         result.warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " +
                                   doubt.expected);
     // A dwell that was never ended has no summary.

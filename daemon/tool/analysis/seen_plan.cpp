@@ -105,7 +105,15 @@ void SeenPlan::tell() {
         std::any_of(plan_.begin(), plan_.end(), [](const auto& one) { return one.kappa > 1; });
     const std::string alias = estimator::VibrationLevel::aliasing(settings_.frequency_hz, period_s_,
                                                                   settings_.level_window_s);
-    if (vibrating && !alias.empty()) std::cerr << "before the run: " << alias << '\n';
+    // A level is that of seconds: whose time is in ms has none, and no suspects either.
+    constexpr double kSlowest_s = 1;
+    if (vibrating && period_s_ >= kSlowest_s) {
+        std::cerr << "before the run: time_s: found " << period_s_
+                  << " s from one sample to the next, expected several samples a second: is it in "
+                     "ms?\n";
+    } else if (vibrating && !alias.empty()) {
+        std::cerr << "before the run: " << alias << '\n';
+    }
 }
 
 }  // namespace vibrig::tool

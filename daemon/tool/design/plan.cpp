@@ -193,8 +193,8 @@ void add_time(CLI::App& command, Options& options) {
     command
         .add_option(
             "--order", request.order,
-            "travel (default): little gimbal travel; balanced: no slow change of a bias looks "
-            "like a coefficient; random: in blocks; list")
+            "travel (default; of a list or plan that is judged: list): little gimbal travel; "
+            "balanced: no slow change of a bias looks like a coefficient; random: in blocks; list")
         ->check(CLI::IsMember({"travel", "balanced", "random", "list"}));
     command.add_option("--block", request.block, "runs in a block of --order random (8)")
         ->check(CLI::Range(std::size_t{1}, std::size_t{10000}));
@@ -245,6 +245,7 @@ void add_plan(CLI::App& app, int& exit_code) {
     }
     const CLI::Option* order = command->get_option("--order");
     command->callback([options, order, &exit_code] {
+        options->request.ordered = order->count() > 0;
         if (options->request.survey.asked() && order->count() == 0)
             options->request.order = "balanced";
         exit_code = guarded([&] {

@@ -333,7 +333,8 @@ class Study {
         }
         planning::Order order(visits.size());
         for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-        const bool as_listed = !designs() || request_.order == "list";
+        const bool as_listed = request_.order == "list" || !request_.given.empty() ||
+                               (!designs() && !request_.ordered);
         if (!as_listed && request_.order == "travel") {
             order = planning::shortest_travel(visits, timing_);
         } else if (!as_listed && request_.order == "balanced") {
@@ -352,7 +353,9 @@ class Study {
             PlanRun& run = single[i];
             const bool again = !out_.runs.empty() &&
                                out_.runs.back().visit.position_deg == run.visit.position_deg &&
-                               out_.runs.back().visit.level_g == run.visit.level_g;
+                               out_.runs.back().visit.level_g == run.visit.level_g &&
+                               out_.runs.back().frequency_hz == run.frequency_hz &&
+                               out_.runs.back().verify == run.verify;
             if (again) {
                 ++out_.runs.back().count;
             } else {

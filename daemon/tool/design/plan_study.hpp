@@ -60,6 +60,7 @@ struct PlanRequest {
     std::optional<double> dwell_s, settle_s, ramp_s;
     double slew_deg_per_s = 5;
     std::string order = "travel";  ///< "travel", "balanced", "random", "list"
+    bool ordered = false;          ///< somebody asked for it: what is judged is put in it, too
     std::size_t block = 8;
     std::uint64_t seed = 1;
     SurveyRequest survey;

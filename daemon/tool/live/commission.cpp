@@ -399,11 +399,9 @@ void add_commission(CLI::App& app, int& exit_code) {
             .add_option("--display", options->display,
                         "units: the unit of amplitude that the controller's display shows")
             ->check(CLI::IsMember(commission::amplitude_units()));
-    auto* const reference =
-        commissioning
-            .add_option("--reference", options->reference_g,
-                        "units: peak g at the table by a reference, at the level of the proof")
-            ->check(CLI::PositiveNumber);
+    auto* const reference = add_number(
+        commissioning, "--reference", options->reference_g,
+        "units: peak g at the table by a reference, at the level of the proof", kAboveZero, 1000);
     display->needs(reference);
     reference->needs(display);
     commissioning.add_flag("--json", options->json,

@@ -291,16 +291,13 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code) {
     command.add_option("--interface", options.interface, "CAN interface, such as can0");
     command.add_option("--seqpacket", options.seqpacket, "Unix socket of a simulated rig's bus");
     command.add_option("--candump", options.candump, "A log of candump -l instead of a bus");
-    command.add_option("--for", options.seconds, "How long to listen, s")
-        ->capture_default_str()
-        ->check(CLI::Range(0.5, 3600.0));
+    add_number(command, "--for", options.seconds, "How long to listen, s", 0.5, 3600)
+        ->capture_default_str();
     command.add_flag("--turn", options.turn,
                      "Listen as long once more while somebody turns one gimbal: which bytes change "
                      "only then");
-    command
-        .add_option("--turn-at", options.turn_at,
-                    "Of a log: s from its beginning on which one gimbal is turned")
-        ->check(CLI::Range(0.5, 1e5));
+    add_number(command, "--turn-at", options.turn_at,
+               "Of a log: s from its beginning on which one gimbal is turned", 0.5, 1e5);
     command.add_option(
         "--dbc", options.dbc,
         "Its signals, too: range and noise, and which one follows the gimbal that is "

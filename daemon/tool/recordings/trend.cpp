@@ -68,10 +68,8 @@ void add_trend(CLI::App& app, int& exit_code) {
         app, exit_code, "trend", "A unit's coefficients over its campaigns", trend);
     command.add_option("SERIAL", options.serial, "the unit's serial number")->required();
     command.add_option("--since", options.since, "campaigns of this day and later, UTC");
-    command
-        .add_option("--shutdown-after", options.shutdown_after_h,
-                    "a longer pause between two campaigns counts as a shutdown, h")
-        ->check(CLI::Range(0.0, 1e6))
+    add_number(command, "--shutdown-after", options.shutdown_after_h,
+               "a longer pause between two campaigns counts as a shutdown, h", 0, 1e6)
         ->capture_default_str();
     command.add_flag("--json", options.json, "print it as JSON");
     command.add_option("--plot", options.plot,

@@ -114,6 +114,19 @@ TEST(RealRig, ALeftHandedTriadIsRefused) {
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"-z\", \"+y\", \"+x\"]\n" + kMap), "");
 }
 
+TEST(RealRig, MotionAcrossTheVerticalIsMeasuredOrDeclared) {
+    // GIVEN a rig that measures along the vertical only
+    const std::string vertical = "platform.second_moment = \"vertical\"\n";
+    EXPECT_THAT(real_complaint(vertical + kMap),
+                HasSubstr("rig.toml:1:26: platform.second_moment: found \"vertical\" without "
+                          "uncertainty.cross_axis, expected uncertainty.cross_axis declared"));
+    EXPECT_THAT(warnings(parse(as_simulated(vertical, true), "rig.toml", true)),
+                ElementsAre(HasSubstr("rig.toml:1: platform.second_moment: found \"vertical\"")));
+    EXPECT_EQ(complaint(vertical, false), "") << "a recording: identify warns";
+    // THEN one that states what it does not see is fine
+    EXPECT_EQ(real_complaint(vertical + "uncertainty.cross_axis = [0.01, 0.02]\n" + kMap), "");
+}
+
 TEST(RealRig, ARangeBelowWhatTheCampaignMakesIsRefused) {
     // 1 + 0.6667 x 9 = 7.0003 g
     EXPECT_THAT(real_complaint("accelerometer.range_g = 7\n" + kMap),

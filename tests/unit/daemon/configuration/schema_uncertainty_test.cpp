@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <string>
+
 #include "tests/unit/daemon/configuration/support.hpp"
 
 // What is declared of a rig: a budget that is none has no place in a result.
@@ -18,6 +21,27 @@ TEST(DeclaredInputs, ThatAreNoBudgetAreRefusedByKeyAndValue) {
     EXPECT_THAT(said("correlation = [[\"latitude\", \"azimuth\", 1.5]]"),
                 HasSubstr("uncertainty.correlation[0][2]"));
     EXPECT_THAT(said("encoder_zero_arcsec = [1, 2]"), HasSubstr("uncertainty.encoder_zero_arcsec"));
+}
+
+TEST(DeclaredInputs, WhatNobodyStatedIsShownAndStaysUndeclared) {
+    const auto shown = [](const Loaded& loaded) {
+        const auto at = std::ranges::find(loaded.effective, "uncertainty.resolver_harmonics",
+                                          &EffectiveValue::key);
+        return at == loaded.effective.end() ? "" : at->value;
+    };
+    const Loaded silent = parse("", "rig.toml", false);
+    EXPECT_THAT(shown(silent), HasSubstr("{ order = 16, arcsec = 3.0, declared = false }"));
+    const auto again = [&shown](const Loaded& loaded) {
+        return accepted("uncertainty.resolver_harmonics = " + shown(loaded)).estimator.uncertainty;
+    };
+    EXPECT_FALSE(again(silent).resolver_harmonics_declared);
+    EXPECT_EQ(again(silent).resolver_harmonics.size(), 3U);
+    const std::string stated = "uncertainty.resolver_harmonics = [{ order = 2, arcsec = 1 }]";
+    EXPECT_TRUE(again(parse(stated, "rig.toml", false)).resolver_harmonics_declared);
+    EXPECT_TRUE(accepted("uncertainty.resolver_harmonics = []")
+                    .estimator.uncertainty.resolver_harmonics_declared);
+    EXPECT_THAT(complaint("uncertainty.resolver_harmonics = [{ order = 2, arcsec = 1, u = 3 }]"),
+                HasSubstr("uncertainty.resolver_harmonics[0]"));
 }
 
 TEST(FreedClasses, AreNamedAsTheVerdictNamesThem) {

@@ -290,6 +290,19 @@ TEST_F(Identify, TheSimulatedRigRefusesWhatIsNoNumber) {
     }
 }
 
+TEST_F(Identify, NoCommandTakesWhatIsNoNumber) {
+    write("empty.log", "");
+    for (const char* command :
+         {"commission bus --candump empty.log --for",
+          "commission bus --candump empty.log --turn-at",
+          "commission units --by Ada --display 'g peak' --reference", "trend 17 --shutdown-after",
+          "study run none --chunk", "predict none.json --profile truck --seconds"}) {
+        const Outcome outcome = vibrig(std::string(command) + " nan");
+        EXPECT_EQ(outcome.exit_code, 2) << command;
+        EXPECT_THAT(outcome.error, HasSubstr(": found nan, expected a finite number")) << command;
+    }
+}
+
 TEST_F(Identify, EveryCommandHasHelpWithAnExample) {
     const Outcome help = vibrig("identify --help");
     EXPECT_EQ(help.exit_code, 0);

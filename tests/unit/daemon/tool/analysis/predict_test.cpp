@@ -42,6 +42,42 @@ TEST_F(Predict, WhatIsTakenAsFlatAgainstTheDataIsDoubtedAndNotPredictedWith) {
     EXPECT_EQ(run("predict flat.json --profile sine.json --attitude 0,0,0 --force").exit_code, 1);
 }
 
+TEST_F(Predict, TheBudgetSaysWhatWasDeclaredAndHow) {
+    write("gain.toml", "[uncertainty]\naccelerometer_gain = { u = 0.004, dof = 12 }\n");
+    const PredictJson coefficient =
+        run("identify survey.csv --config gain.toml --json").json()["parameters"][4];
+    const auto part = [&](const std::string& input) {
+        for (const PredictJson& one : coefficient["budget"])
+            if (one["input"] == input) return one;
+        return PredictJson();
+    };
+    const PredictJson stated = part("accelerometer_gain"), silent = part("time_base");
+    ASSERT_FALSE(stated.is_null() || silent.is_null()) << coefficient["budget"];
+    EXPECT_EQ(stated["declared"], true);
+    EXPECT_EQ(stated["shape"], "normal");
+    EXPECT_EQ(stated["dof"], 12);
+    EXPECT_EQ(stated["u"], 0.004);
+    EXPECT_NEAR(stated["contribution"], std::abs(stated["c"].get<double>()) * 0.004, 1e-12);
+    // What nobody has stated stands at its default.
+    EXPECT_EQ(silent["declared"], false);
+    EXPECT_EQ(silent["shape"], "rectangular");
+    EXPECT_EQ(silent["u"], 1e-5);
+    EXPECT_THAT(part("gain_between_frequencies")["element"].get<std::string>(),
+                ::testing::MatchesRegex("[0-9]+ Hz"));
+}
+
+TEST_F(Predict, InGroupsACoefficientIsThatAtTheLowestFrequency) {
+    const Ended ended = run("identify survey.csv --spectrum groups --json");
+    ASSERT_EQ(ended.exit_code, 0) << ended.error;
+    const PredictJson found = ended.json();
+    const PredictJson& square = found["parameters"][4];
+    EXPECT_EQ(square["at_hz"], 15);
+    EXPECT_EQ(square["value"], found["spectrum"]["frequencies"][0]["coefficients"][0]);
+    // 0.03, and 6.59 % of the elastic half; over all frequencies it would be 0.02.
+    EXPECT_NEAR(square["value"].get<double>(), 0.030989, 4 * square["u"].get<double>());
+    EXPECT_LT(square["u"], 0.002);
+}
+
 TEST_F(Predict, HeldOutDwellsConfirm) {
     const Ended ended =
         run("predict result.json --profile sine.json --verify held_out.csv --config held.toml "

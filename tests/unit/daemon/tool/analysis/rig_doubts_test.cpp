@@ -34,14 +34,17 @@ class WrongKeys : public ::testing::TestWithParam<WrongKey> {
             std::system(("cd '" + folder_.string() + "' && " + command + " >out 2>error").c_str());
         return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     }
+    static std::string content(const char* name) {
+        std::ostringstream text;
+        text << std::ifstream(folder_ / name).rdbuf();
+        return text.str();
+    }
     /// Exit code and all warnings of an identification.
     static std::pair<int, std::string> identify(const std::string& configuration) {
         std::ofstream(folder_ / "rig.toml") << configuration;
         const int code = run(std::string(VIBRIG) + " identify rec.csv --config rig.toml --json");
-        std::ostringstream text;
-        text << std::ifstream(folder_ / "out").rdbuf();
         std::string warnings;
-        const auto result = nlohmann::json::parse(text.str());
+        const auto result = nlohmann::json::parse(content("out"));
         for (const auto& warning : result.at("warnings"))
             warnings += warning.get<std::string>() + "\n";
         return {code, warnings};
@@ -83,7 +86,20 @@ INSTANTIATE_TEST_SUITE_P(
                       WrongKey{"Elevation", "site.elevation_deg = 1.5", "site.elevation_deg: 0.0"}),
     [](const auto& wrong) { return std::string(wrong.param.name); });
 
-class RightKeys : public WrongKeys {};
+class RightKeys : public WrongKeys {
+  protected:
+    /// Of the recording with another unit of time.
+    static std::pair<int, std::string> identify_with_time_times(const std::string& factor) {
+        EXPECT_EQ(
+            run("awk -F, 'BEGIN{OFS=\",\"} NR==1{for(i=1;i<=NF;++i) if($i==\"time_s\") t=i} "
+                "NR>1{$t=sprintf(\"%.12g\",$t*(" +
+                factor + "))} {print}' rec.csv > m.csv && mv rec.csv s.csv && mv m.csv rec.csv; :"),
+            0);
+        auto found = identify("");
+        std::filesystem::rename(folder_ / "s.csv", folder_ / "rec.csv");
+        return found;
+    }
+};
 
 TEST_F(RightKeys, RaiseNoDoubt) {
     const auto [code, warnings] = identify("");
@@ -96,15 +112,23 @@ TEST_F(RightKeys, ButTwoGyrosOnOneAxisAreReported) {
                 HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too"));
 }
 
+TEST_F(RightKeys, ButVibrationAlongTheVerticalOnlyWantsTheRestDeclared) {
+    const std::string vertical = "platform.second_moment = \"vertical\"\n";
+    EXPECT_THAT(identify(vertical).second,
+                HasSubstr("platform.second_moment: found \"vertical\" without"));
+    EXPECT_THAT(identify(vertical + "uncertainty.cross_axis = 0.01").second,
+                Not(HasSubstr("second_moment")));
+}
+
 TEST_F(RightKeys, ButTimeInMinutesIsSuspected) {
-    ASSERT_EQ(run("awk -F, 'BEGIN{OFS=\",\"} NR==1{for(i=1;i<=NF;++i) if($i==\"time_s\") t=i} "
-                  "NR>1{$t=sprintf(\"%.12g\",$t/60)} {print}' rec.csv > m.csv && mv rec.csv s.csv "
-                  "&& mv m.csv rec.csv; :"),
-              0);
-    const auto [code, warnings] = identify("");
-    EXPECT_EQ(run("mv s.csv rec.csv"), 0);
+    const auto [code, warnings] = identify_with_time_times("1/60");
     EXPECT_EQ(code, 1);
     EXPECT_THAT(warnings, HasSubstr("time_s: it is in minutes"));
+}
+
+TEST_F(RightKeys, ButTimeInMillisecondsIsAskedAbout) {
+    EXPECT_EQ(identify_with_time_times("1000").first, 1);
+    EXPECT_THAT(content("error"), HasSubstr("time_s: found 25 s from one sample to the next"));
 }
 
 }  // namespace

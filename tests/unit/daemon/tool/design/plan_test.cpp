@@ -71,7 +71,20 @@ TEST_F(PlanCommand, JudgesPositionLists) {
     // AND so is z up
     write("z.toml", "platform.up = \"+z\"\n");
     EXPECT_EQ(vibrig("plan --positions table1.csv --levels 6,4.667 --config z.toml"), 1);
-    EXPECT_NE(error.find("D12 not at all (D_IOx"), std::string::npos) << error;
+    EXPECT_NE(error.find("does not determine D12 at all (D_IOx"), std::string::npos) << error;
+}
+
+TEST_F(PlanCommand, AListThatIsJudgedIsPutInTheOrderThatIsAskedFor) {
+    write("table1.csv", kTable1);
+    const std::string judged = "plan --positions table1.csv --levels 6,4.667 --json";
+    ASSERT_EQ(vibrig(judged), 0) << error;
+    EXPECT_GT(json()["order_inflation"]["step"], 10);
+    ASSERT_EQ(json()["warnings"].size(), 1U);
+    EXPECT_NE(json()["warnings"][0].get<std::string>().find("--order balanced"), std::string::npos);
+    ASSERT_EQ(vibrig(judged + " --order balanced"), 0) << error;
+    EXPECT_EQ(json()["run_count"], 28);
+    EXPECT_LT(json()["order_inflation"]["step"], 1.5);
+    EXPECT_EQ(json()["warnings"], Json::array());
 }
 
 TEST_F(PlanCommand, NumbersHaveToBeFiniteAndWithinReason) {

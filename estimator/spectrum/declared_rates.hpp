@@ -1,0 +1,23 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/spectrum/prediction.hpp"
+#include "estimator/spectrum/table.hpp"
+
+namespace vibrig::estimator::spectrum {
+
+/// What the declared inputs do to the rates of all dwells.
+struct DeclaredRates {
+    Eigen::MatrixXd rates;        ///< 3 n x m, one standard uncertainty each
+    std::vector<Effect> effects;  ///< of each, without its change
+};
+
+/// Correlations are worked in. `groups`: the coefficients, `shaken`: the dwells' rates due to
+/// vibration, n x 3.
+[[nodiscard]] DeclaredRates declared_rates(const Settings& settings, const SpectralTable& table,
+                                           const Eigen::MatrixXd& groups,
+                                           const Eigen::MatrixXd& shaken);
+
+}  // namespace vibrig::estimator::spectrum
