@@ -56,7 +56,7 @@ std::vector<estimator::AngleBlock> blocks_of(const Campaign& campaign, const Rec
     };
     for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
         const auto& sample = campaign.samples[i];
-        if (!sample.angles_good()) continue;
+        if (!record::angles_known(sample)) continue;
         const double t = drivers::to_seconds(sample.time - dwell.order->from);
         if (const auto at = static_cast<std::size_t>(t / kBlock_s); at != number) {
             close();
