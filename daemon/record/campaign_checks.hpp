@@ -28,6 +28,9 @@ namespace vibrig::record {
 inline constexpr drivers::Time kMostTime = drivers::Time{1} << 60,
                                kMostUtc = drivers::Time{1} << 62;
 
+/// Of a dwell: twice what a configuration may order.
+inline constexpr drivers::Time kLongestDwell = 2 * 86'400 * drivers::kSecond;
+
 /// A text that is printed sooner or later, on terminals too.
 [[nodiscard]] inline std::string shown(std::string_view text) {
     constexpr std::size_t kLongest = 1000;

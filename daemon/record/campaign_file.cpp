@@ -260,6 +260,17 @@ bool is_hdf5(const std::string& path) {
 
 namespace {
 
+void refuse_orders(const File& file, const std::vector<Order>& orders) {
+    for (std::size_t i = 0; i < orders.size(); ++i) {
+        columns_of(orders[i], Finite{file, "/orders", i});
+        if (const drivers::Time length = orders[i].to - orders[i].from; length > kLongestDwell)
+            throw hdf5::Error(fmt::format(
+                "{}: /orders/to_ns: row {}: found a dwell of {:.0f} s, expected at most {:.0f}",
+                file.path(), i + 1, drivers::to_seconds(length),
+                drivers::to_seconds(kLongestDwell)));
+    }
+}
+
 /// Its head alone.
 Campaign begin_part(const File& file) {
     Campaign campaign;
@@ -276,8 +287,7 @@ Campaign read_part(const std::string& path) try {
     Campaign campaign = begin_part(file);
     campaign.samples = rows_of<drivers::Sample>(file, "/samples");
     campaign.orders = rows_of<Order>(file, "/orders");
-    for (std::size_t i = 0; i < campaign.orders.size(); ++i)
-        columns_of(campaign.orders[i], Finite{file, "/orders", i});
+    refuse_orders(file, campaign.orders);
     read_played(file, campaign);
     Dwell dwell;
     dwell.covariance.resize(estimator::kParameters * estimator::kParameters);

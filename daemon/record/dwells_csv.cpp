@@ -285,6 +285,8 @@ void read_dwells(const std::string& path, Campaign& to) {
             order.to = microseconds(fields[kTo], place);
             if (order.to <= order.from)
                 throw std::runtime_error(place + ": found an end before the beginning");
+            if (order.to - order.from > kLongestDwell)
+                refuse(place, line, "a dwell of two days at most");
         }
         to.orders.push_back(order);
     }

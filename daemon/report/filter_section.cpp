@@ -41,7 +41,7 @@ std::size_t every_of(const std::vector<record::EstimateRow>& rows) {
 
 Chart deviations(const Campaign& campaign, const Group& group) {
     const auto& rows = campaign.estimates;
-    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const double origin = origin_s(campaign);
     Chart chart{.title = std::string(group.title) + ": standard deviation",
                 .x = Axis("time, s"),
                 .y = Axis(std::string("1 sigma, ") + group.unit, true)};
@@ -75,7 +75,7 @@ Chart deviations(const Campaign& campaign, const Group& group) {
 
 Chart distances(const Campaign& campaign, const Coefficients& last) {
     const auto& rows = campaign.estimates;
-    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const double origin = origin_s(campaign);
     Chart chart{.title = "Estimates on the way to their final values",
                 .x = Axis("time, s"),
                 .y = Axis("distance from the final value, final sigmas", true)};
@@ -115,7 +115,8 @@ Chart over_time(const Innovations& found) {
     }
     const double band = 2 * std::max({found.deviation_arcsec[0], found.deviation_arcsec[1],
                                       found.deviation_arcsec[2]});
-    add_limits(chart, "2 sigma", found.time_s.front(), found.time_s.back(), band);
+    if (!found.time_s.empty())
+        add_limits(chart, "2 sigma", found.time_s.front(), found.time_s.back(), band);
     return chart;
 }
 

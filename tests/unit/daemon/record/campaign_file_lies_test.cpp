@@ -110,6 +110,9 @@ TEST_F(Lies, OfNumbersThatDoNotFitAreRefused) {
 TEST_F(Lies, OfOrdersWithoutNumbersAreRefused) {
     column("/orders/zero_g", {0, 0, 0, 0, kNoNumber, 0}, {2, 3});
     refused("/orders/zero_g", "row 2: found nan, expected a finite number");
+    column("/orders/zero_g", std::vector<double>(6), {2, 3});
+    column("/orders/to_ns", {5e9, 1e15}, {2});
+    refused("/orders/to_ns", "row 2: found a dwell of 999998 s, expected at most 172800");
 }
 
 TEST_F(Lies, InTextsThatATerminalObeysAreShown) {
