@@ -121,7 +121,7 @@ class Case:
         elif said := NO_NUMBER.search(out):
             return f"prints {said[0]}: {out[max(0, said.start() - 200):][:300]}"
         for made in ("x.csv", "x.html"):
-            with contextlib.suppress(OSError), open(os.path.join(self.out, made), encoding="utf-8") as file:
+            with contextlib.suppress(OSError), open(os.path.join(self.out, made), encoding="utf-8", errors="replace") as file:
                 text = re.sub(r"<pre.*?</pre>", "", file.read(), flags=re.DOTALL)   # the configuration as it is
                 os.remove(file.name)
                 if said := re.search(r"(?<![\w.])-?(nan|inf)\b(?=[,<\" ]|$)|<script>alert", text):
