@@ -115,8 +115,7 @@ Chart over_time(const Innovations& found) {
     }
     const double band = 2 * std::max({found.deviation_arcsec[0], found.deviation_arcsec[1],
                                       found.deviation_arcsec[2]});
-    if (!found.time_s.empty())
-        add_limits(chart, "2 sigma", found.time_s.front(), found.time_s.back(), band);
+    add_limits(chart, "2 sigma", found.time_s.front(), found.time_s.back(), band);
     return chart;
 }
 
@@ -183,10 +182,11 @@ void add_innovations(Page& page, const Analysis& a) {
     page.section("innovations", "Innovations");
     const Innovations& found = a.innovations;
     if (found.count == 0) return page.paragraph("No sample came into the filter.");
-    page.figure(
-        over_time(found).svg(),
-        fmt::format("Every {}th of {} innovations.",
-                    std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
+    if (!found.time_s.empty())
+        page.figure(
+            over_time(found).svg(),
+            fmt::format("Every {}th of {} innovations.",
+                        std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
     add_whiteness(page, found);
     add_nis(page, a);
 }

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <string>
+#include <cstddef>
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/report/page.hpp"
@@ -35,7 +35,7 @@ TEST(FilterSection, IsWrittenOfInnovationsOfWhichNoneIsShown) {
     analysis.innovations.count = 5;
     Page page;
     add_innovations(page, analysis);
-    EXPECT_THAT(page.html("a"), HasSubstr("Innovations"));
+    EXPECT_THAT(page.html("a"), HasSubstr("Normalised innovations squared"));
 }
 
 }  // namespace
