@@ -11,8 +11,6 @@ namespace vibrig::proto {
 
 namespace {
 
-constexpr std::size_t kQuotedLength = 40;
-
 /// Bytes of the UTF-8 sequence at the text's beginning; 0 if there is none.
 /// Overlong forms, surrogates and code points above U+10FFFF are none (RFC 3629).
 std::size_t sequence_length(std::string_view text) noexcept {
@@ -33,13 +31,16 @@ std::size_t sequence_length(std::string_view text) noexcept {
 
 }  // namespace
 
-std::string printable(std::string_view text) {
+std::string printable(std::string_view text, std::size_t longest) {
     std::string out;
     std::size_t i = 0;
-    while (i < text.size() && i < kQuotedLength) {
+    while (i < text.size() && i < longest) {
         const auto byte = static_cast<unsigned char>(text[i]);
         const std::size_t length = sequence_length(text.substr(i));
-        if (length == 0 || byte < 0x20 || byte == 0x7f) {
+        // Some terminals obey U+0080 to U+009F, too.
+        const bool c1 =
+            length == 2 && byte == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0;
+        if (length == 0 || byte < 0x20 || byte == 0x7f || c1) {
             std::array<char, 8> hex{};
             std::snprintf(hex.data(), hex.size(), "\\x%02x", static_cast<unsigned>(byte));
             out += hex.data();

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <charconv>
+#include <cstddef>
 #include <string>
 #include <string_view>
 
 namespace vibrig::proto {
 
-/// What is quoted in an error message: cut to a readable length, control and foreign bytes as \xNN.
-[[nodiscard]] std::string printable(std::string_view text);
+inline constexpr std::size_t kQuotedLength = 40;
+/// What is quoted in an error message, or shown: cut to a readable length, what a terminal obeys
+/// and foreign bytes as \xNN.
+[[nodiscard]] std::string printable(std::string_view text, std::size_t longest = kQuotedLength);
 [[nodiscard]] std::string_view without_byte_order_mark(std::string_view text) noexcept;
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;
 [[nodiscard]] std::string utf8_from_latin1(std::string_view text);

@@ -4,15 +4,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <fstream>
 #include <initializer_list>
+#include <new>
 #include <set>
+#include <span>
 #include <sstream>
 #include <string_view>
 #include <type_traits>
 #include <variant>
 
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_columns.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/hdf5.hpp"
@@ -39,12 +43,16 @@ struct Columns {
     void operator()(const char* name, const auto& field, const char*, const char*,
                     std::initializer_list<std::size_t> = {}) {
         const auto numbers = numbers_in(field);
-        if constexpr (std::same_as<typename decltype(numbers)::value_type, double>) {
+        using Number = typename decltype(numbers)::value_type;
+        if constexpr (std::same_as<Number, double>) {
             take(name, file.doubles(group + "/" + name), numbers.size());
         } else {
             const auto& found = take(name, file.integers(group + "/" + name), numbers.size());
             const auto end = std::ranges::find(found, hdf5::kUnwritten);
-            rows = std::min(rows, static_cast<std::size_t>(end - found.begin()) / numbers.size());
+            const auto written = static_cast<std::size_t>(end - found.begin());
+            rows = std::min(rows, written / numbers.size());
+            check_numbers<Number>(file, group, name, std::span(found).first(written),
+                                  numbers.size());
         }
     }
     void newer(const char* name, const auto&... column) {
@@ -97,7 +105,7 @@ void set(estimator::PlayedRandom::Word& word, std::int64_t number) {
     using Word = estimator::PlayedRandom::Word;
     word = number == 0 || number == 1 ? static_cast<Word>(number) : Word::refused;
 }
-void set(std::string& field, const std::string& text) { field = text; }
+void set(std::string& field, const std::string& text) { field = shown(text); }
 void set(Severity& severity, const std::string& word) {
     for (const Severity s : {Severity::warning, Severity::alarm, Severity::trip}) {
         if (word == name_of(s)) severity = s;
@@ -185,9 +193,9 @@ void read_head(const File& file, Campaign& to) {
         using Field = std::remove_reference_t<decltype(field)>;
         try {
             if constexpr (std::same_as<Field, std::string>) {
-                field = file.text("/", name);
+                field = shown(file.text("/", name));
             } else {
-                field = static_cast<Field>(file.number("/", name));
+                field = checked_number<Field>(file, name);
             }
         } catch (const hdf5::Error&) {
             if (std::string_view(name) != "simulated") throw;
@@ -205,11 +213,11 @@ void read_head(const File& file, Campaign& to) {
         head.journal_head = file.text("/", "journal_head");
     } catch (const hdf5::Error&) {  // of a daemon that kept no journal, or of one that signed none
     }
-    to.state = file.text("/", "state");
+    to.state = shown(file.text("/", "state"));
     if (to.state != "running") {
-        to.reason = file.text("/", "reason");
-        to.ended_utc_ns = file.number("/", "ended_utc_ns");
-        to.mark = file.text("/", "mark");
+        to.reason = shown(file.text("/", "reason"));
+        to.ended_utc_ns = checked_number<drivers::Time>(file, "ended_utc_ns");
+        to.mark = shown(file.text("/", "mark"));
     }
     if (file.has("/result")) to.result_json = file.read_text("/result");
 }
@@ -252,6 +260,17 @@ bool is_hdf5(const std::string& path) {
 
 namespace {
 
+void refuse_orders(const File& file, const std::vector<Order>& orders) {
+    for (std::size_t i = 0; i < orders.size(); ++i) {
+        columns_of(orders[i], Finite{file, "/orders", i});
+        if (const drivers::Time length = orders[i].to - orders[i].from; length > kLongestDwell)
+            throw hdf5::Error(fmt::format(
+                "{}: /orders/to_ns: row {}: found a dwell of {:.0f} s, expected at most {:.0f}",
+                file.path(), i + 1, drivers::to_seconds(length),
+                drivers::to_seconds(kLongestDwell)));
+    }
+}
+
 /// Its head alone.
 Campaign begin_part(const File& file) {
     Campaign campaign;
@@ -263,11 +282,12 @@ Campaign begin_part(const File& file) {
 
 }  // namespace
 
-Campaign read_part(const std::string& path) {
+Campaign read_part(const std::string& path) try {
     const File file = File::open(path, File::Mode::read);
     Campaign campaign = begin_part(file);
     campaign.samples = rows_of<drivers::Sample>(file, "/samples");
     campaign.orders = rows_of<Order>(file, "/orders");
+    refuse_orders(file, campaign.orders);
     read_played(file, campaign);
     Dwell dwell;
     dwell.covariance.resize(estimator::kParameters * estimator::kParameters);
@@ -280,6 +300,22 @@ Campaign read_part(const std::string& path) {
     campaign.gaps = rows_of<Gap>(file, "/gaps");
     read_conditions(file, campaign);
     return campaign;
+} catch (const std::bad_alloc&) {
+    throw hdf5::Error(path + ": found more in it than there is memory for");
+}
+
+namespace {
+bool finite(const std::array<double, 3>& values) {
+    return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+}  // namespace
+
+bool angles_known(const drivers::Sample& sample) {
+    return sample.angles_good() && finite(sample.angle);
+}
+
+bool force_known(const drivers::Sample& sample) {
+    return sample.force_good() && finite(sample.force);
 }
 
 Campaign read_part_head(const std::string& path) {

@@ -89,6 +89,9 @@ void close_part(const std::string& path, const std::string& next);
 [[nodiscard]] std::string with_raw_log(std::string what, const std::string& path);
 /// HDF5 by its first bytes; false for what cannot be read.
 [[nodiscard]] bool is_hdf5(const std::string& path);
+/// Good, and numbers: a file may say so of what is none.
+[[nodiscard]] bool angles_known(const drivers::Sample& sample);
+[[nodiscard]] bool force_known(const drivers::Sample& sample);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
 /// That of a rig that is a program, by its effective configuration.
 [[nodiscard]] bool of_simulated_rig(const std::string& configuration);

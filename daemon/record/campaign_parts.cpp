@@ -7,6 +7,7 @@
 #include <set>
 
 #include "daemon/dwells/anew.hpp"
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "proto/text.hpp"
@@ -107,6 +108,10 @@ void go_on_after_restart(Campaign& to, Campaign& part, Time last) {
     // UTC may have been set back meanwhile; dwells only know differences.
     if (!part.samples.empty() && !to.samples.empty() && part.samples.front().time + shift <= last)
         shift = last + drivers::kSecond - part.samples.front().time;
+    if (shift < -kMostTime || shift > kMostTime)
+        throw std::runtime_error(fmt::format(
+            "{}: attribute utc_offset_ns: found {}, expected it near {} of the first part",
+            part.path, part.head.utc_offset_ns, to.head.utc_offset_ns));
     move_times(part, shift);
     to.moved = shift;
     const std::size_t before = fed(to.dwells);

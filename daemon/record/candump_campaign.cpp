@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <set>
@@ -11,6 +12,7 @@
 #include <string>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/dwells_csv.hpp"
 #include "daemon/record/raw_frames.hpp"
 #include "drivers/sample/assembler.hpp"
@@ -37,7 +39,8 @@ void unbind_newer(const std::set<std::string>& listed, drivers::SignalBindings& 
     for (const auto& row : drivers::kStatusTable) check(row.name, row.signal);
 }
 
-drivers::AssemblerSettings assembler_settings(const std::string& configuration) {
+drivers::AssemblerSettings assembler_settings(const std::string& configuration,
+                                              const std::string& folder) {
     std::istringstream lines(configuration);
     std::string kept;
     std::set<std::string> keys;
@@ -46,8 +49,8 @@ drivers::AssemblerSettings assembler_settings(const std::string& configuration) 
         kept += line + "\n";
         keys.insert(line.substr(0, line.find_first_of(" =")));
     }
-    auto settings =
-        configuration::parse(kept, "configuration of the recording", false).configuration.assembler;
+    auto settings = configuration::parse(kept, "configuration of the recording in " + folder, false)
+                        .configuration.assembler;
     unbind_newer(keys, settings.bindings);
     return settings;
 }
@@ -55,10 +58,12 @@ drivers::AssemblerSettings assembler_settings(const std::string& configuration) 
 /// Frames as the acquisition thread takes them.
 class FrameReader {
   public:
-    FrameReader(const std::string& dbc, const std::string& configuration,
+    /// `folder`: of the recording, for what is wrong with DBC or configuration.
+    FrameReader(const std::string& folder, const std::string& dbc, const std::string& configuration,
                 std::int64_t utc_offset_ns, std::vector<drivers::Sample>& to)
-        : dbc_(proto::parse_dbc(dbc.empty() ? proto::rig_dbc_text() : dbc, "DBC of the recording")),
-          settings_(assembler_settings(configuration)),
+        : dbc_(proto::parse_dbc(dbc.empty() ? proto::rig_dbc_text() : dbc,
+                                "DBC of the recording in " + folder)),
+          settings_(assembler_settings(configuration, folder)),
           to_(to),
           utc_offset_ns_(utc_offset_ns) {
         begin();
@@ -78,6 +83,11 @@ class FrameReader {
                 continue;
             }
             const Time time = one->frame.time;
+            if (time < -kMostTime || time > kMostUtc)
+                throw std::runtime_error(fmt::format(
+                    "{}:{}: found a time {:.0f} years from the campaign's, expected a nearer one",
+                    frames.path_of(*one), one->line,
+                    std::abs(drivers::to_seconds(time)) / (365.25 * 86400)));
             // Behind one another; a second for time stamps that are not quite in order.
             if (log != one->log && last_ > 0 && time + drivers::kSecond < last_)
                 throw std::runtime_error(fmt::format(
@@ -129,8 +139,8 @@ class FrameReader {
 
 std::vector<drivers::Sample> samples_from_raw(const Campaign& campaign, Time& until) {
     std::vector<drivers::Sample> samples;
-    FrameReader reader(campaign.head.dbc, campaign.head.configuration, campaign.head.utc_offset_ns,
-                       samples);
+    FrameReader reader(campaign.folder, campaign.head.dbc, campaign.head.configuration,
+                       campaign.head.utc_offset_ns, samples);
     reader.read(raw_files(campaign.folder));
     reader.finish();
     until = reader.until();
@@ -144,7 +154,8 @@ Campaign campaign_from_candump(const std::vector<std::string>& logs, const std::
     campaign.head.configuration = configuration;
     campaign.head.simulated = of_simulated_rig(configuration);
     read_dwells(dwells, campaign);
-    FrameReader reader(dbc, configuration, campaign.head.utc_offset_ns, campaign.samples);
+    FrameReader reader(folder_of(logs.front()), dbc, configuration, campaign.head.utc_offset_ns,
+                       campaign.samples);
     reader.read(in_order(logs));
     reader.finish();
     if (campaign.samples.empty())

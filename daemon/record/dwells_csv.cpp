@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/dwells/anew.hpp"
+#include "daemon/record/campaign_checks.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::record {
@@ -104,7 +105,8 @@ Time microseconds(const std::string& text, const std::string& place) {
     std::string fraction = point == std::string::npos ? "" : text.substr(point + 1);
     fraction.resize(6, '0');
     if (!proto::read_number(std::string_view(text).substr(0, point), whole) ||
-        !proto::read_number(std::string_view(fraction), part) || whole < 0)
+        !proto::read_number(std::string_view(fraction), part) || whole < 0 || part < 0 ||
+        whole >= kMostUtc / drivers::kSecond)
         refuse(place, text, "seconds such as 1700000000.123456");
     return (whole * 1'000'000 + part) * drivers::kMicrosecond;
 }
@@ -149,11 +151,13 @@ void read_played(const std::string& text, const std::string& place, Campaign& to
 void read_swept(const std::string& text, const std::string& place, Campaign& to) {
     try {
         const auto json = nlohmann::json::parse(text);
-        for (const auto& one : json.at(2))
-            to.swept.push_back({one.at(0).get<std::int64_t>() * drivers::kMicrosecond +
-                                    one.at(1).get<std::int64_t>(),
-                                json.at(0).get<std::int32_t>(), json.at(1).get<std::int32_t>(),
-                                one.at(2).get<double>()});
+        for (const auto& one : json.at(2)) {
+            const auto us = one.at(0).get<std::int64_t>(), ns = one.at(1).get<std::int64_t>();
+            if (us < 0 || us >= kMostUtc / drivers::kMicrosecond || std::abs(ns) >= kMostTime)
+                refuse(place, text, "times of a sweep");
+            to.swept.push_back({us * drivers::kMicrosecond + ns, json.at(0).get<std::int32_t>(),
+                                json.at(1).get<std::int32_t>(), one.at(2).get<double>()});
+        }
     } catch (const nlohmann::json::exception& error) {
         refuse(place, text, std::string("the frequencies of a sweep as JSON: ") + error.what());
     }
@@ -268,7 +272,9 @@ void read_dwells(const std::string& path, Campaign& to) {
         const auto fields = fields_of(line);
         Order order;
         std::int64_t offset_us = 0;
-        if (!read_order(fields, order, offset_us))
+        if (!read_order(fields, order, offset_us) ||
+            offset_us < -kMostTime / drivers::kMicrosecond ||
+            offset_us > kMostUtc / drivers::kMicrosecond)
             refuse(place, line, "the fields that the header names");
         to.head.utc_offset_ns = offset_us * drivers::kMicrosecond;
         order.cancel = !fields[kCancelled].empty();
@@ -279,14 +285,21 @@ void read_dwells(const std::string& path, Campaign& to) {
             order.to = microseconds(fields[kTo], place);
             if (order.to <= order.from)
                 throw std::runtime_error(place + ": found an end before the beginning");
+            if (order.to - order.from > kLongestDwell)
+                refuse(place, line, "a dwell of two days at most");
         }
         to.orders.push_back(order);
     }
     if (to.orders.empty()) throw std::runtime_error(path + ": found no dwell, expected some");
-    for (SweptRow& row : to.swept) row.time -= to.head.utc_offset_ns;
+    const auto to_clock = [&](Time& time) {
+        time -= to.head.utc_offset_ns;
+        if (time < -kMostTime || time > kMostUtc)
+            refuse(path, fmt::to_string(time), "ns of the clock that its utc_offset_us is of");
+    };
+    for (SweptRow& row : to.swept) to_clock(row.time);
     for (Order& order : to.orders) {
         for (Time* time : {&order.announced, &order.from, &order.to})
-            if (*time != 0) *time -= to.head.utc_offset_ns;
+            if (*time != 0) to_clock(*time);
     }
 }
 

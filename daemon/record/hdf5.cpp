@@ -35,7 +35,7 @@ std::string what_it_says() {
     std::string text;
     const auto take = [](unsigned, const H5E_error2_t* error, void* to) -> herr_t {
         auto& out = *static_cast<std::string*>(to);
-        if (error->desc == nullptr || out.size() >= 300) return 0;
+        if (error->desc == nullptr) return 0;
         std::string_view words = error->desc;
         // The system's own words stand behind time, file and numbers.
         constexpr std::string_view kSystem = "error message = '";
@@ -44,7 +44,7 @@ std::string what_it_says() {
             out = words.substr(0, words.find('\''));
             return 1;  // who called whom adds nothing
         }
-        out += (out.empty() ? "" : "; ") + std::string(words);
+        if (out.empty()) out = words;  // of who called whom the innermost
         return 0;
     };
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take, &text);
@@ -129,6 +129,14 @@ std::size_t count_of(const std::vector<std::size_t>& dimensions) {
     return std::accumulate(dimensions.begin(), dimensions.end(), std::size_t{1}, std::multiplies{});
 }
 
+/// Likewise, where the dimensions are anybody's: more than any file holds rather than too few.
+std::size_t count_said(const std::vector<std::size_t>& dimensions) {
+    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max() / 2;
+    std::size_t count = 1;
+    for (const std::size_t d : dimensions) count = d > 0 && count > kMost / d ? kMost : count * d;
+    return count;
+}
+
 }  // namespace
 
 Handle& Handle::operator=(Handle&& other) noexcept {
@@ -209,10 +217,18 @@ void File::make_group(const std::string& name) {
 
 bool File::has(const std::string& name) const {
     // Every step of the path must be there to be asked for the next.
-    for (std::size_t at = name.find('/', 1); at != std::string::npos; at = name.find('/', at + 1)) {
-        if (H5Lexists(file_.get(), name.substr(0, at).c_str(), H5P_DEFAULT) <= 0) return false;
+    for (std::size_t end = 0; end != std::string::npos;) {
+        end = name.find('/', end + 1);
+        const std::string step = name.substr(0, end);
+        const htri_t there = H5Lexists(file_.get(), step.c_str(), H5P_DEFAULT);
+        H5L_info_t info{};
+        if (there == 0) return false;
+        if (there < 0 || H5Lget_info(file_.get(), step.c_str(), &info, H5P_DEFAULT) < 0) fail(step);
+        // It may lead to any file of this machine, and a pipe is waited for.
+        if (info.type != H5L_TYPE_HARD)
+            throw Error(path_ + ": " + step + ": found a link, expected what it leads to");
     }
-    return H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT) > 0;
+    return true;
 }
 
 void File::attribute(const std::string& object, const char* name, std::int64_t type,
@@ -307,22 +323,35 @@ void File::write_numbers(const std::string& name, std::span<const double> values
 }
 
 Handle File::open_set(const std::string& name) const {
+    if (!has(name)) throw Error(path_ + ": " + name + ": found nothing, expected a dataset");
     Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
     if (set.get() < 0) fail(name);
+    const Handle list(H5Dget_create_plist(set.get()), H5Pclose);
+    if (H5Pget_external_count(list.get()) > 0 || H5Pget_layout(list.get()) == H5D_VIRTUAL)
+        throw Error(path_ + ": " + name + ": found values of another file, expected them in this");
     return set;
+}
+
+std::size_t File::values_in(const Handle& set, const std::string& name) const {
+    // A few bytes may say that they are any number of values. What is compressed is so by a
+    // thousand at most, and what a writer that died has not placed in the file is a second or two.
+    constexpr std::size_t kCompressed = 1100, kUnplaced = 1 << 20;
+    const std::size_t count = count_said(dimensions_of(set));
+    const std::size_t bytes = H5Dget_storage_size(set.get());
+    if (count > kUnplaced && count / kCompressed > bytes)
+        throw Error(path_ + ": " + name + ": found " + std::to_string(count) + " values in " +
+                    std::to_string(bytes) + " bytes, expected as many as they hold");
+    return count;
 }
 
 template <typename T>
 Array<T> File::read(const std::string& name, std::int64_t type) const {
     const Handle set = open_set(name);
+    const Handle held(H5Dget_type(set.get()), H5Tclose);
+    if (const auto kind = H5Tget_class(held.get()); kind != H5T_INTEGER && kind != H5T_FLOAT)
+        throw Error(path_ + ": " + name + ": found no numbers, expected them");
     Array<T> array{dimensions_of(set), {}};
-    const std::size_t count = count_of(array.dimensions);
-    try {
-        array.values.resize(count);
-    } catch (const std::exception&) {  // a dataset of a few bytes may say that it is longer
-        throw Error(path_ + ": " + name + ": found " + std::to_string(count) +
-                    " numbers, expected as many as there is memory for");
-    }
+    array.values.resize(values_in(set, name));
     if (!array.values.empty() &&
         H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()) < 0)
         fail(name);
@@ -342,7 +371,7 @@ std::vector<std::string> File::texts(const std::string& name) const {
     if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
         throw Error(path_ + ": " + name + ": found no texts of fixed size, expected them");
     const std::size_t size = H5Tget_size(type.get());
-    const std::size_t count = count_of(dimensions_of(set));
+    const std::size_t count = values_in(set, name);
     std::string all(size * count, '\0');
     if (count > 0 && H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0)
         fail(name);

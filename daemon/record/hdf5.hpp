@@ -70,6 +70,7 @@ class File {
     void close();
 
     void make_group(const std::string& name);
+    /// A link is no part of a recording: throws.
     [[nodiscard]] bool has(const std::string& name) const;
     void set(const std::string& object, const char* attribute, std::string_view text);
     void set(const std::string& object, const char* attribute, std::int64_t number);
@@ -98,6 +99,8 @@ class File {
     [[noreturn]] void fail(const std::string& object) const;
 
   private:
+    /// Of the values that it says it has.
+    [[nodiscard]] std::size_t values_in(const Handle& set, const std::string& name) const;
     void attribute(const std::string& object, const char* name, std::int64_t type,
                    const void* value);
     void write_set(const std::string& name, const Handle& space, std::int64_t type,

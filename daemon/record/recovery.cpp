@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_columns.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
@@ -34,9 +35,10 @@ std::vector<drivers::Sample> more_from_raw(const Campaign& part, Gap& gap, std::
     } catch (const std::exception& error) {
         failure = std::string("raw log: ") + error.what();
     }
-    std::erase_if(more, [last](const drivers::Sample& s) { return s.time <= last; });
+    std::erase_if(
+        more, [last](const drivers::Sample& s) { return s.time <= last || s.time > kMostTime; });
     gap.from = last;
-    gap.to = std::max(last, until);
+    gap.to = std::clamp(until, last, std::max(last, kMostTime));
     return more;
 }
 

@@ -56,9 +56,9 @@ std::vector<estimator::AngleBlock> blocks_of(const Campaign& campaign, const Rec
     };
     for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
         const auto& sample = campaign.samples[i];
-        if (!sample.angles_good()) continue;
+        if (!record::angles_known(sample)) continue;
         const double t = drivers::to_seconds(sample.time - dwell.order->from);
-        if (const auto at = static_cast<std::size_t>(t / kBlock_s); at != number) {
+        if (const auto at = static_cast<std::size_t>(std::max(0.0, t / kBlock_s)); at != number) {
             close();
             number = at;
         }
@@ -251,6 +251,10 @@ void allan_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells
 
 }  // namespace
 
+double origin_s(const Campaign& campaign) {
+    return campaign.samples.empty() ? 0 : drivers::to_seconds(campaign.samples.front().time);
+}
+
 estimator::Settings settings_of(const Campaign& campaign) {
     return dwells::Anew::settings_of(
         configuration::parse(record::identification_sections(campaign.head.configuration),
@@ -329,7 +333,10 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
         plan.push_back(planned);
     }
     out.expected_sigma.fill(std::numeric_limits<double>::infinity());
-    if (const double period_s = period_of(campaign, dwells); !plan.empty() && period_s > 0) {
+    // Of readings closer together than any rig's it would be a sum of billions.
+    constexpr double kShortest_s = 1e-4;
+    if (const double period_s = period_of(campaign, dwells);
+        !plan.empty() && period_s > kShortest_s) {
         out.expected_sigma =
             estimator::predicted_sigma(settings, plan, out.coefficients.value, period_s);
     }

@@ -59,6 +59,8 @@ using Progress = std::function<void(double fraction)>;
 [[nodiscard]] Analysis analyse(const record::Campaign& campaign,
                                const estimator::Settings& settings, const Progress& progress);
 
+/// Of its first sample, on the daemon's clock; 0: there is none.
+[[nodiscard]] double origin_s(const record::Campaign& campaign);
 /// The same of a recording that is not replayed.
 [[nodiscard]] Coefficients recorded_coefficients(const record::Campaign& campaign);
 [[nodiscard]] estimator::Settings settings_of(const record::Campaign& campaign);

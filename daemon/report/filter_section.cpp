@@ -41,7 +41,7 @@ std::size_t every_of(const std::vector<record::EstimateRow>& rows) {
 
 Chart deviations(const Campaign& campaign, const Group& group) {
     const auto& rows = campaign.estimates;
-    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const double origin = origin_s(campaign);
     Chart chart{.title = std::string(group.title) + ": standard deviation",
                 .x = Axis("time, s"),
                 .y = Axis(std::string("1 sigma, ") + group.unit, true)};
@@ -75,7 +75,7 @@ Chart deviations(const Campaign& campaign, const Group& group) {
 
 Chart distances(const Campaign& campaign, const Coefficients& last) {
     const auto& rows = campaign.estimates;
-    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const double origin = origin_s(campaign);
     Chart chart{.title = "Estimates on the way to their final values",
                 .x = Axis("time, s"),
                 .y = Axis("distance from the final value, final sigmas", true)};
@@ -182,10 +182,11 @@ void add_innovations(Page& page, const Analysis& a) {
     page.section("innovations", "Innovations");
     const Innovations& found = a.innovations;
     if (found.count == 0) return page.paragraph("No sample came into the filter.");
-    page.figure(
-        over_time(found).svg(),
-        fmt::format("Every {}th of {} innovations.",
-                    std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
+    if (!found.time_s.empty())
+        page.figure(
+            over_time(found).svg(),
+            fmt::format("Every {}th of {} innovations.",
+                        std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
     add_whiteness(page, found);
     add_nis(page, a);
 }

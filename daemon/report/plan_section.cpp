@@ -23,11 +23,13 @@ namespace {
 
 constexpr double kSameDirection = 0.02;  // a degree or so: where the gimbals stop is not exact
 
-/// What the encoders show at the beginning of a dwell, deg.
+/// What the encoders show at the beginning of a dwell, deg; 0 where that is no number.
 planning::Vec3 position_of(const Campaign& campaign, const record::RecordedDwell& dwell) {
     planning::Vec3 position{};
     for (std::size_t k = 0; k < 3; ++k)
         position[k] = campaign.samples[dwell.first].angle[k] * estimator::kDegPerRad;
+    for (double& angle : position)
+        if (!std::isfinite(angle)) angle = 0;
     return position;
 }
 

@@ -216,7 +216,7 @@ void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
     page.section("vibration", "Vibration");
     const auto& rows = campaign.estimates;
     if (!rows.empty()) {
-        const double origin = drivers::to_seconds(campaign.samples.front().time);
+        const double origin = origin_s(campaign);
         const std::size_t every = std::max<std::size_t>(1, rows.size() / kMostShown);
         Curve amplitude{.look = Look::dots}, frequency{.look = Look::dots};
         for (std::size_t i = 0; i < rows.size(); i += every) {

@@ -12,6 +12,8 @@ namespace {
 
 /// A longer gap is treated as a change of position: the angles start afresh.
 constexpr double kLongestPause_s = 1.0;
+/// Readings in it, where their times lie and leave room for millions.
+constexpr double kMostMissing = kLongestPause_s * VibrationLevel::kHighestRate_hz;
 /// So many stamps in a row before the newest accepted one mean that that one was wrong.
 constexpr int kBadTimesBeforeRestart = 5;
 constexpr auto kBufferCapacity =
@@ -271,8 +273,8 @@ StepResult Identification::Impl::replay() noexcept {
     double previous = buffer_.readings().front().time_s - period_s_;
     std::size_t good = 0;
     for (const Reading& reading : buffer_.readings()) {
-        const double slots =
-            std::min(std::round((reading.time_s - previous) / period_s_), 1.0 / period_s_);
+        const double slots = std::min(
+            {std::round((reading.time_s - previous) / period_s_), 1.0 / period_s_, kMostMissing});
         for (double k = 1; k < slots; ++k) {
             level_.add_first_missing();
             tensor_.add_missing();
@@ -329,7 +331,8 @@ void Identification::Impl::let_biases_walk() noexcept {
 }
 
 void Identification::Impl::to_level(const Reading& reading) noexcept {
-    const double slots = std::round((reading.time_s - last_time_s_) / period_s_);
+    const double slots =
+        std::min(std::round((reading.time_s - last_time_s_) / period_s_), kMostMissing);
     record_.note_interval((reading.time_s - last_time_s_) / period_s_);
     for (double k = 1; k < slots; ++k) {
         level_.add_missing();

@@ -107,7 +107,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
         const double begin_s = common_clock ? dwell.order->begin_s : 0;
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
             const auto& sample = campaign.samples[i];
-            if (!sample.angles_good() || !sample.force_good()) {
+            if (!record::angles_known(sample) || !record::force_known(sample)) {
                 ++left_out;
                 continue;
             }

@@ -158,9 +158,12 @@ int export_campaign(const ExportOptions& options) {
         progress.show(0, 1);
         campaign = read_named_campaign(argument);
     }
-    if (path.empty())
+    if (path.empty()) {
+        // Here, whatever the recording says of itself.
         path = campaign.head.name +
                (format == "candump" || format == "wireshark" ? ".log" : "." + format);
+        std::ranges::replace(path, '/', '_');
+    }
     keep_recordings(path);
     if (format == "csv") {
         export_csv(campaign, path);

@@ -1,6 +1,7 @@
 """A recorded campaign: its HDF5 files (campaign.h5, campaign-2.h5 ...) joined, as `vibrig` itself joins them."""
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -23,6 +24,10 @@ FORMAT_VERSION = 2
 UNWRITTEN = np.iinfo(np.int64).min  # a row that never reached the disk
 SECOND = 10**9
 PIECE = 2**20  # rows looked at in one go
+FEW = 2**20  # so many values may have no place in a file that is being written
+COMPRESSED = 1100  # times, at most
+ATTRIBUTES: Mapping[str, Any] = {"format_version": int, "part": int, "restart": bool, "dwells_before": int, "utc_offset_ns": int,
+                                 "started_utc_ns": int, "name": str, "campaign": str, "started_by": str, "state": str, "version": str}
 TABLES = ("samples", "orders", "dwells", "estimates", "conditions", "events", "gaps")
 TIMES = {"time_ns", "announced_ns", "from_ns", "to_ns"}
 LABELS: dict[str, Sequence[str]] = {
@@ -72,15 +77,16 @@ class Table(Mapping[str, npt.NDArray[Any]]):
         if column not in self._read:
             parts = []
             for segment in self._segments:
-                with _open_file(segment.path) as file:
-                    dataset = file[self.name][column]
+                with _reading(segment.path), _open_file(segment.path) as file:
+                    dataset = _dataset(file[self.name], column, segment.path)
                     values = dataset[:segment.rows][segment.keep]
                     if (self.name, column) == ("samples", "quality"):
                         values = _by_channel(values, _places_of(dataset, segment.path))
-                if values.dtype.kind == "S":
-                    values = np.array([v.decode("utf-8", "replace") for v in values], dtype=object)
-                parts.append(values + segment.shift_ns if column in TIMES else values)
-            self._read[column] = np.concatenate(parts)
+                    if values.dtype.kind == "S":
+                        values = np.array([v.decode("utf-8", "replace") for v in values], dtype=object)
+                    parts.append(values + segment.shift_ns if column in TIMES else values)
+            with _reading(self._segments[0].path):
+                self._read[column] = np.concatenate(parts)
         return self._read[column]
 
     def __iter__(self) -> Iterator[str]:
@@ -99,7 +105,8 @@ class Table(Mapping[str, npt.NDArray[Any]]):
     def utc(self, column: str = "") -> npt.NDArray[np.datetime64]:
         """Times of a column as UTC, datetime64[ns]; without a name those of the table's first column of times."""
         column = column or next((name for name in ("time_ns", "from_ns") if name in self.units), "")
-        stamps: npt.NDArray[np.datetime64] = (self[column] + self._utc_offset_ns).astype("datetime64[ns]")
+        with _reading(self._segments[0].path):
+            stamps: npt.NDArray[np.datetime64] = (self[column] + self._utc_offset_ns).astype("datetime64[ns]")
         return stamps
 
     def frame(self) -> Any:
@@ -187,7 +194,8 @@ class Campaign:
         """The effective configuration, parsed. Raises ImportError before Python 3.11."""
         if tomllib is None:
             raise ImportError("tomllib: found Python before 3.11, expected 3.11; configuration_text has the text")
-        return tomllib.loads(self.configuration_text)
+        with _reading(self.parts[0]):
+            return tomllib.loads(self.configuration_text)
 
     @property
     def verdict(self) -> Mapping[str, Any] | None:
@@ -202,10 +210,11 @@ class Campaign:
         dwells = self.dwells
         if dwells.rows == 0:
             raise ValueError(f"{self.parts[0]}: found no finished dwell, expected one")
-        if self.result and self.result.get("covariance_combined"):
-            return Coefficients.of_result(self.result)
-        return Coefficients(dwells["value"][-1], dwells["sigma"][-1], dwells["covariance"][-1],
-                            dwells["observable"][-1] != 0)
+        with _reading(self.parts[-1]):
+            if self.result and self.result.get("covariance_combined"):
+                return Coefficients.of_result(self.result)
+            return Coefficients(dwells["value"][-1], dwells["sigma"][-1], dwells["covariance"][-1],
+                                dwells["observable"][-1] != 0)
 
     def compensation(self, attitude_deg: Sequence[float], *, table_g: float | None = None,
                      platform_g: float | None = None) -> Drift:
@@ -218,18 +227,23 @@ class Campaign:
             raise ValueError("table_g: found it beside platform_g, expected one of them")
         if len(attitude_deg) != 3 or not np.all(np.isfinite(attitude_deg)):
             raise ValueError(f"attitude_deg: found {attitude_deg!r}, expected three angles, deg")
-        settings = self.configuration
-        level = platform_g or (table_g or 0.0) * settings["vibration"]["transmission"]
+        with _reading(self.parts[0]):
+            settings = self.configuration
+            level = platform_g or (table_g or 0.0) * settings["vibration"]["transmission"]
+            platform = settings["platform"]
+            up = up_in_platform(attitude_deg, platform["up"], platform["encoder_sign"], platform["encoder_zero_deg"])
+            axes = [platform[f"gyro_{g}_axes"] for g in "xyz"]
         if not 0 <= level <= 1000:
             raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")
-        platform = settings["platform"]
-        up = up_in_platform(attitude_deg, platform["up"], platform["encoder_sign"], platform["encoder_zero_deg"])
-        return self.coefficients.drift(up, 1 + level**2 / 2, [platform[f"gyro_{g}_axes"] for g in "xyz"])
+        with _reading(self.parts[0]):
+            return self.coefficients.drift(up, 1 + level**2 / 2, axes)
 
     def of_dwell(self, index: int) -> slice:
         """Rows of `samples` that belong to a finished dwell (0 is the first), by its order's times and, where it was
         cut short, by the samples that the filter saw. Raises IndexError."""
-        return self._dwell_rows()[index]
+        with _reading(self.parts[0]):
+            rows = self._dwell_rows()
+        return rows[index]
 
     def _dwell_rows(self) -> list[slice]:
         times, orders, dwells = self.samples["time_ns"], self.orders, self.dwells
@@ -281,12 +295,69 @@ def _by_channel(values: npt.NDArray[Any], places: Sequence[int]) -> npt.NDArray[
 
 
 def _open_file(path: Path) -> h5py.File:
-    """Of one that is being written, too."""
+    """Of one that is being written, too: of such a one what does not fit together is read again, for minutes."""
     try:
-        return h5py.File(path, "r", swmr=True)
+        try:
+            return h5py.File(path, "r")
+        except OSError:
+            return h5py.File(path, "r", swmr=True)
     except (OSError, ValueError) as error:
         raise FormatError(f"{path}: found no HDF5 file that can be read ({error}), expected a campaign's; after a "
                           "crash `vibrig recover` mends it") from error
+
+
+def _dataset(group: h5py.Group, name: str, path: Path) -> h5py.Dataset:
+    """Of this file itself: a link may lead to any other, and a few bytes may say that they are any number of values."""
+    def refuse(found: str) -> None:
+        raise FormatError(f"{path}: {group.name.rstrip('/')}/{name}: found {found}")
+
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        refuse("a link, expected what it leads to")
+    found = group[name]
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        refuse("no values, expected a dataset")
+    if found.external or found.is_virtual:
+        refuse("values of another file, expected them in this")
+    if found.size > FEW and found.size / COMPRESSED > found.id.get_storage_size():
+        refuse(f"{found.size} values in {found.id.get_storage_size()} bytes, expected as many as they hold")
+    return found
+
+
+def _columns(file: h5py.File, table: str, path: Path) -> dict[str, h5py.Dataset]:
+    """By name; none where the file has no such table."""
+    if file.get(table, getlink=True) is None:
+        return {}
+    if not isinstance(file.get(table, getlink=True), h5py.HardLink) or not isinstance(file[table], h5py.Group):
+        raise FormatError(f"{path}: /{table}: found no group, expected one with columns")
+    # HDF5 1.10 ends the process where it goes through a group that is damaged: the head of the file says what is in it.
+    head = _json(_long_text(file, "head", path), f"{path}: /head") or {}
+    names = head.get("units", {}).get(table) or file[table]
+    columns = {name: _dataset(file[table], name, path) for name in names if name in file[table]}
+    for name, column in columns.items():
+        if column.ndim == 0:
+            raise FormatError(f"{path}: /{table}/{name}: found one value, expected rows")
+    return columns
+
+
+def _long_text(file: h5py.File, name: str, path: Path) -> str:
+    if file.get(name, getlink=True) is None:
+        return ""
+    found = _dataset(file, name, path)
+    if found.ndim > 0 or found.dtype.kind not in "SO":
+        raise FormatError(f"{path}: /{name}: found no text, expected one")
+    return _text(found[()])
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """What h5py and numpy say of a file that lies becomes a FormatError."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise FormatError(f"{path}: found what cannot be read ({str(error) or type(error).__name__}), expected a "
+                          "campaign's HDF5 file") from error
 
 
 def _text(value: Any) -> str:
@@ -342,10 +413,10 @@ class _Part:
             segment.shift_ns = by_ns
 
 
-def _rows_of(group: h5py.Group) -> int:
+def _rows_of(columns: Mapping[str, h5py.Dataset]) -> int:
     """Of a group that may be growing: what every column has."""
-    rows = min((column.shape[0] for column in group.values()), default=0)
-    for column in group.values():
+    rows = min((column.shape[0] for column in columns.values()), default=0)
+    for column in columns.values():
         if column.dtype != np.int64:
             continue
         for begin in range(0, rows, PIECE):   # recordings may be larger than memory
@@ -358,24 +429,31 @@ def _rows_of(group: h5py.Group) -> int:
 
 
 def _read_part(path: Path) -> _Part:
-    with _open_file(path) as file:
+    with _reading(path), _open_file(path) as file:
         attributes = {name: _text(v) if isinstance(v, bytes) else v for name, v in file.attrs.items()}
         if attributes.get("format") != "vibrig-campaign":
             raise FormatError(f"{path}: attribute format: found {attributes.get('format', 'nothing')}, expected "
                               "vibrig-campaign")
+        missing = [name for name in ATTRIBUTES if name not in attributes]
+        if missing:
+            raise FormatError(f"{path}: attribute {missing[0]}: found nothing, expected it")
+        for name, kind in ATTRIBUTES.items():
+            value = attributes[name]
+            if isinstance(value, h5py.Empty) or np.ndim(value) > 0 or isinstance(value, str) != (kind is str):
+                raise FormatError(f"{path}: attribute {name}: found {value!r:.40}, expected one value of its kind")
+            attributes[name] = kind(value)
         if attributes["format_version"] != FORMAT_VERSION:
             raise FormatError(f"{path}: format_version: found {attributes['format_version']}, expected "
                               f"{FORMAT_VERSION}")
-        texts = {name: _text(file[name][()]) if name in file else ""
-                 for name in ("configuration", "dbc", "plan", "result", "interlocks")}
+        texts = {name: _long_text(file, name, path) for name in ("configuration", "dbc", "plan", "result", "interlocks")}
         segments, columns = {}, {}
         for table in TABLES:
-            group = file.get(table)
-            rows = _rows_of(group) if group is not None else 0
+            there = _columns(file, table, path)
+            rows = _rows_of(there)
             segments[table] = _Segment(path, rows, np.ones(rows, dtype=bool))
             columns[table] = {name: (_text(column.attrs.get("unit", "")), _text(column.attrs.get("description", "")))
-                              for name, column in (group.items() if group is not None else ())}
-        if "samples" in file and "quality" in file["samples"]:
+                              for name, column in there.items()}
+        if "quality" in columns["samples"]:
             _places_of(file["samples"]["quality"], path)
         few = {table: {name: file[table][name][:segments[table].rows] for name in names} for table, names in
                (("samples", ("time_ns",)), ("orders", ("announced_ns", "cancel", "run", "position")),
@@ -463,11 +541,13 @@ def open_campaign(path: PathLike) -> Campaign:
                       or part.attributes["campaign"] != parts[0].attributes["campaign"]):
             raise FormatError(f"{file}: found part {part.attributes['part']} of {part.attributes['campaign']}, expected "
                               f"part {number} of {parts[0].attributes['campaign']}")
-        if parts:
-            _join(parts, part)
-        else:
-            parts.append(part)
-    return _made_of(parts)
+        with _reading(file):
+            if parts:
+                _join(parts, part)
+            else:
+                parts.append(part)
+    with _reading(parts[0].path):
+        return _made_of(parts)
 
 
 def _made_of(parts: list[_Part]) -> Campaign:

@@ -222,7 +222,7 @@ TEST_F(CampaignFile, WithAttributesThatAreNotOneValueIsRefusedOrRead) {
     H5Tclose(variable);
 }
 
-TEST_F(CampaignFile, OfMoreRowsThanThereIsMemoryForIsRefused) {
+TEST_F(CampaignFile, OfMoreRowsThanItHoldsIsRefused) {
     write();
     const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     const hid_t quality = H5Dopen2(file, kQuality, H5P_DEFAULT);
@@ -231,7 +231,7 @@ TEST_F(CampaignFile, OfMoreRowsThanThereIsMemoryForIsRefused) {
     H5Dclose(quality);
     H5Fclose(file);
     EXPECT_THAT(refusal(), AllOf(HasSubstr(path_ + ": " + kQuality),
-                                 HasSubstr("expected as many as there is memory for")));
+                                 HasSubstr("expected as many as they hold")));
 }
 
 /// A build with one column more and one number more in a row goes on with an older one's table.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <functional>
 #include <string>
 
@@ -338,6 +339,24 @@ TEST(Robustness, ADwellWhoseVibrationStartsLateIsTakenOut) {
     EXPECT_EQ(result.dwells[3].rejected, result.dwells[3].samples);
     EXPECT_EQ(flagged(result), 1U);
     expect_within_four_sigma(result);
+}
+
+/// As a recording may lie: a million readings would be missing between two.
+TEST(Robustness, ReadingsANanosecondApartAndGapsBetweenThemAreTaken) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({1, 1});
+    const std::clock_t begin = std::clock();
+    double time_s = 0;
+    for (int i = 0; i < 20'000; ++i) {
+        time_s += i % 2000 == 1999 ? 0.9 : 1e-9;
+        static_cast<void>(identification.add({.time_s = time_s,
+                                              .angle_rad = {0.1, 0.1, 0.1},
+                                              .force_g = {0, 1, 0},
+                                              .angles_good = true,
+                                              .force_good = true}));
+    }
+    EXPECT_EQ(identification.end_dwell().samples, 20'000U);
+    EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 10);
 }
 
 }  // namespace
