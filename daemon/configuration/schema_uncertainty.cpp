@@ -127,6 +127,17 @@ Key declared(std::string name, std::function<std::span<Declared>(C&)> at, std::s
     return {name, "uncertainty", unit, "0 to " + plain(largest), doc, read, write};
 }
 
+/// For whose place something else stands until it is stated.
+Key declared_if_stated(std::string name, At<std::optional<Declared>> at, std::string unit,
+                       double largest, std::string doc) {
+    auto read = [=](const Entry& entry, C& c) {
+        if (const auto value = read_declared(entry, largest, unit)) at(c) = value;
+    };
+    auto write = [at](C& c) { return at(c) ? write_declared(*at(c)) : std::string(); };
+    const std::string bounds = "0 to " + plain(largest) + "; none: not declared";
+    return {name, "uncertainty", unit, bounds, doc, read, write};
+}
+
 Key harmonics() {
     using estimator::uncertainty::Harmonic;
     constexpr const char* kHarmonic = "{ order = .., arcsec = .. }";
@@ -247,15 +258,13 @@ Key freed_classes() {
             schema_of_array("{\"enum\":[" + words + "]}", 0, kStructuralNames.size())};
 }
 
-/// Not declared while it is negative or infinite inside; no value in a file says so.
+/// Not declared while it is infinite inside; no value in a file says so.
 Key optional_number(std::string name, At<double> at, std::string unit, Range range,
                     std::string doc) {
     auto read = [=](const Entry& entry, C& c) {
         at(c) = entry.number(range, unit).value_or(at(c));
     };
-    auto write = [at](C& c) {
-        return at(c) < 0 || std::isinf(at(c)) ? std::string() : write_number(at(c));
-    };
+    auto write = [at](C& c) { return std::isinf(at(c)) ? std::string() : write_number(at(c)); };
     const std::string bounds = plain(range.low) + " to " + plain(range.high);
     return {name, "number", unit, bounds + "; none: not declared", doc, read, write};
 }
@@ -314,10 +323,13 @@ std::vector<Key> uncertainty_keys() {
                              "u as the platform's, or declared as the base's rocking"),
         optional_number("uncertainty.noise_dof", in(&Inputs::noise_dof), "", {1, 1e9},
                         "degrees of freedom of the configured noise; none: known"),
-        optional_number("uncertainty.turn_on_bias", in(&Inputs::turn_on_bias), "deg/h", {0, 1e6},
-                        "repeatability of D_F from one switch-on to the next"),
-        optional_number("uncertainty.turn_on_linear", in(&Inputs::turn_on_linear), "deg/h/g",
-                        {0, 1e6}, "repeatability of D_I, D_O, D_S from one switch-on to the next"),
+        declared_if_stated("uncertainty.turn_on_bias", in(&Inputs::turn_on_bias), "deg/h", 1e6,
+                           "repeatability of D_F from one switch-on to the next"),
+        declared_if_stated("uncertainty.turn_on_linear", in(&Inputs::turn_on_linear), "deg/h/g",
+                           1e6, "repeatability of D_I, D_O, D_S from one switch-on to the next"),
+        declared_if_stated("uncertainty.ramp_in_dwell", in(&Inputs::ramp_in_dwell), "deg/h", 1e6,
+                           "of D_F for another power-on, by a ramp of the bias in every dwell; "
+                           "none: half of the mean ramp that the dwells show"),
         number("uncertainty.coverage", in(&Inputs::coverage), "", {0.5, 0.9999},
                "probability that the expanded uncertainty covers"),
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,8 +55,10 @@ struct Inputs {
     Declared bias_step_between_runs{0};  ///< deg/h
     SyncMotionOf sync_motion = SyncMotionOf::warn;
     double noise_dof = std::numeric_limits<double>::infinity();
-    /// Repeatability from one switch-on to the next, deg/h and deg/h/g; negative: not declared.
-    double turn_on_bias = -1, turn_on_linear = -1;
+    /// Repeatability from one switch-on to the next, deg/h and deg/h/g.
+    std::optional<Declared> turn_on_bias, turn_on_linear;
+    /// Of D_F by a ramp of the bias in every dwell, deg/h; none: as the dwells show it.
+    std::optional<Declared> ramp_in_dwell;
     std::vector<Correlation> correlations;
     double coverage = 0.95;
 };

@@ -232,14 +232,15 @@ void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
 /// For another power-on; stays NaN while nobody has said how it repeats.
 void for_use(const Settings& settings, std::size_t internal, const RampFit& ramps, Coefficient& c) {
     const Inputs& in = settings.uncertainty;
-    if (in.turn_on_bias < 0 || in.turn_on_linear < 0) return;
+    if (!in.turn_on_bias || !in.turn_on_linear) return;
     const std::size_t group = internal / kGyros, gyro = internal % kGyros;
     double square = c.u * c.u;
     if (group == kDt) {
-        const double ramp = std::abs(ramps.mean[gyro]) / 2 / std::sqrt(3.0);
-        square += in.turn_on_bias * in.turn_on_bias + ramp * ramp;
+        const double ramp = in.ramp_in_dwell ? in.ramp_in_dwell->u
+                                             : std::abs(ramps.mean[gyro]) / 2 / std::sqrt(3.0);
+        square += in.turn_on_bias->u * in.turn_on_bias->u + ramp * ramp;
     } else if (group <= kDo) {
-        square += in.turn_on_linear * in.turn_on_linear;
+        square += in.turn_on_linear->u * in.turn_on_linear->u;
     }
     c.u_use = std::sqrt(square);
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "tests/unit/daemon/configuration/support.hpp"
@@ -42,6 +43,24 @@ TEST(DeclaredInputs, WhatNobodyStatedIsShownAndStaysUndeclared) {
                     .estimator.uncertainty.resolver_harmonics_declared);
     EXPECT_THAT(complaint("uncertainty.resolver_harmonics = [{ order = 2, arcsec = 1, u = 3 }]"),
                 HasSubstr("uncertainty.resolver_harmonics[0]"));
+}
+
+TEST(DeclaredInputs, ForAnotherPowerOnAreNumbersOrTables) {
+    const auto inputs = [](const std::string& text) {
+        return accepted("[uncertainty]\n" + text).estimator.uncertainty;
+    };
+    const auto stated = inputs(
+        "turn_on_bias = 0.05\n"
+        "turn_on_linear = { half_width = 0.6, shape = \"triangular\" }\n"
+        "ramp_in_dwell = { half_width = 0.3, shape = \"rectangular\", dof = 5 }");
+    ASSERT_TRUE(stated.turn_on_bias && stated.turn_on_linear && stated.ramp_in_dwell);
+    EXPECT_EQ(stated.turn_on_bias->u, 0.05);
+    EXPECT_NEAR(stated.turn_on_linear->u, 0.6 / std::sqrt(6.0), 1e-12);
+    EXPECT_NEAR(stated.ramp_in_dwell->u, 0.3 / std::sqrt(3.0), 1e-12);
+    const auto silent = inputs("");
+    EXPECT_FALSE(silent.turn_on_bias || silent.turn_on_linear || silent.ramp_in_dwell);
+    EXPECT_THAT(complaint("[uncertainty]\nramp_in_dwell = -0.1"),
+                HasSubstr("uncertainty.ramp_in_dwell: found -0.1"));
 }
 
 TEST(FreedClasses, AreNamedAsTheVerdictNamesThem) {

@@ -237,8 +237,8 @@ estimator::Result full_result() {
         r.value[i] = 1 + static_cast<double>(i);
         r.sigma[i] = 0.5;
         r.observable[i] = true;
+        r.covariance[i][i] = 1;
     }
-    r.covariance.setIdentity();
     r.amplitudes.push_back({1, 5.99, 18.9, 0.002, 15.0});
     r.combinations.push_back({{{"D_Fx", 1.0}, {"D_OOx", 19.0}}, 2.5, 0.1});
     r.nis_per_dof = 1.01;

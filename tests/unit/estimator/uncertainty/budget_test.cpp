@@ -171,12 +171,21 @@ TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
 
 TEST(Budget, ForAnotherPowerOnTheSwitchingOnIsAdded) {
     Settings settings;
-    settings.uncertainty.turn_on_bias = 0.05;
-    settings.uncertainty.turn_on_linear = 0.01;
+    settings.uncertainty.turn_on_bias = Declared{0.05};
+    settings.uncertainty.turn_on_linear = Declared{0.01};
     const Assessment a = of_clean_rig(settings);
     EXPECT_GT(a.coefficients[0].u_use, 0.05);
     EXPECT_NEAR(a.coefficients[1].u_use, std::hypot(a.coefficients[1].u, 0.01), 1e-12);
     EXPECT_EQ(a.coefficients[4].u_use, a.coefficients[4].u);
+}
+
+TEST(Budget, ADeclaredRampWithinDwellsTakesThePlaceOfTheOneThatShows) {
+    Settings settings;
+    settings.uncertainty.turn_on_bias = Declared{0.05};
+    settings.uncertainty.turn_on_linear = Declared{0.01};
+    settings.uncertainty.ramp_in_dwell = Declared{0.12};
+    const Coefficient bias = of_clean_rig(settings).coefficients[0];
+    EXPECT_NEAR(bias.u_use, std::hypot(bias.u, 0.05, 0.12), 1e-12);
 }
 
 TEST(VerdictOnTheWay, WhatLaterDwellsWillDetermineIsNoReasonYet) {
