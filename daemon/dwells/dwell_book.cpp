@@ -8,8 +8,7 @@
 
 namespace vibrig::dwells {
 
-DwellBook::DwellBook(const estimator::Settings& settings, EventSink event,
-                     Noise noise)
+DwellBook::DwellBook(const estimator::Settings& settings, EventSink event, Noise noise)
     : settings_(settings),
       decides_(noise),
       identification_(settings),

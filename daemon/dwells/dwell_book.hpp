@@ -27,8 +27,8 @@ class DwellBook {
         given     ///< by use_noise(): the monitor is left alone
     };
     /// Without an `event` nobody hears of the noise (noise::NoiseMonitor). Throws SettingsError.
-    explicit DwellBook(const estimator::Settings& settings,
-                       EventSink event = nullptr, Noise noise = Noise::decided);
+    explicit DwellBook(const estimator::Settings& settings, EventSink event = nullptr,
+                       Noise noise = Noise::decided);
 
     /// A new campaign, of about so many dwells: everything is forgotten.
     void begin(std::size_t dwells);

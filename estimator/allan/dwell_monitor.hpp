@@ -39,8 +39,7 @@ class DwellMonitor {
   public:
     explicit DwellMonitor(const DwellMonitorSettings& settings) : settings_(settings) {}
 
-    /// Tests of one gyro in one dwell: its octaves, and the mean of the dwell, which is not judged
-    /// here.
+    /// Tests of one gyro in one dwell: its octaves, and the mean, which is not judged here.
     [[nodiscard]] static std::size_t tests_of(const DwellBasis& basis);
     /// Octaves whose MDEV is not that of the earlier dwells of the same level. Changes nothing.
     [[nodiscard]] std::vector<Alarm> check(const DwellAngles& dwell) const;

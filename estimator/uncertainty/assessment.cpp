@@ -221,9 +221,8 @@ void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
     double inverse = rho * rho / in.noise_dof;
     if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
     double sum = std::pow(c.u_a, 4) * inverse;
-    for (const Contribution& one : c.budget) {
+    for (const Contribution& one : c.budget)
         if (std::isfinite(one.dof)) sum += std::pow(one.contribution, 4) / one.dof;
-    }
     c.nu_eff = sum > 0 ? std::pow(c.u, 4) / sum : std::numeric_limits<double>::infinity();
     c.k = student_quantile(in.coverage, std::max(1.0, std::floor(c.nu_eff)));
     c.expanded = c.k * c.u;
@@ -233,12 +232,12 @@ void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
 void for_use(const Settings& settings, std::size_t internal, const RampFit& ramps, Coefficient& c) {
     const Inputs& in = settings.uncertainty;
     if (!in.turn_on_bias || !in.turn_on_linear) return;
-    const std::size_t group = internal / kGyros, gyro = internal % kGyros;
+    const std::size_t group = internal / kGyros;
     double square = c.u * c.u;
     if (group == kDt) {
-        const double ramp = in.ramp_in_dwell ? in.ramp_in_dwell->u
-                                             : std::abs(ramps.mean[gyro]) / 2 / std::sqrt(3.0);
-        square += in.turn_on_bias->u * in.turn_on_bias->u + ramp * ramp;
+        const Declared seen{std::abs(ramps.mean[internal % kGyros]) / 2 / std::sqrt(3.0)};
+        for (const Declared& one : {*in.turn_on_bias, in.ramp_in_dwell.value_or(seen)})
+            square += one.u * one.u;
     } else if (group <= kDo) {
         square += in.turn_on_linear->u * in.turn_on_linear->u;
     }

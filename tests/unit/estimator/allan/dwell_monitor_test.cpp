@@ -8,6 +8,8 @@
 #include <numeric>
 #include <random>
 
+#include "estimator/allan/dwell_basis.hpp"
+
 namespace {
 
 using namespace vibrig::estimator::allan;

@@ -60,7 +60,7 @@ TEST(Exposure, WhatIsCoherentAlongAxesIsTheSameAlongTheLine) {
     axes.axes.cross = {times(line[0] * line[1]), times(line[0] * line[2]),
                        times(line[1] * line[2])};
     check(axes);
-    const Profile along{"line", density, {}, line, 0};
+    const Profile along{"line", density, {}, {line[0], line[1], line[2]}, 0};
     ASSERT_NEAR(mean_square(axes), mean_square(along), 1e-12);
     Situation one = under(along, 100);
     one.moments.clear();
