@@ -1,11 +1,13 @@
 #include "proto/text.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 namespace vibrig::proto {
 
@@ -29,28 +31,38 @@ std::size_t sequence_length(std::string_view text) noexcept {
     return length;
 }
 
+/// One character as it is, or its escape; a byte that is none, its escape.
+std::string shown(std::string_view bytes) {
+    constexpr std::array<std::pair<char, const char*>, 3> kNamed{
+        {{'\n', "\\n"}, {'\r', "\\r"}, {'\t', "\\t"}}};
+    for (const auto& [byte, name] : kNamed)
+        if (bytes.front() == byte) return name;
+    unsigned code = static_cast<unsigned char>(bytes.front());
+    const bool foreign = bytes.size() == 1 && code >= 0x80;
+    if (bytes.size() > 1) code &= 0xFFU >> (bytes.size() + 1);
+    for (const char byte : bytes.substr(1))
+        code = code << 6U | (static_cast<unsigned>(byte) & 0x3FU);
+    const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
+    const bool turns = code == 0x200E || code == 0x200F || (code >= 0x2028 && code <= 0x202E) ||
+                       (code >= 0x2066 && code <= 0x2069);
+    if (!control && !turns && !foreign) return std::string(bytes);
+    std::array<char, 8> out{};
+    std::snprintf(out.data(), out.size(), bytes.size() == 1 ? "\\x%02x" : "\\u%04x", code);
+    return out.data();
+}
+
 }  // namespace
 
 std::string printable(std::string_view text, std::size_t longest) {
     std::string out;
-    std::size_t i = 0;
-    while (i < text.size() && i < longest) {
-        const auto byte = static_cast<unsigned char>(text[i]);
-        const std::size_t length = sequence_length(text.substr(i));
-        // Some terminals obey U+0080 to U+009F, too.
-        const bool c1 =
-            length == 2 && byte == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0;
-        if (length == 0 || byte < 0x20 || byte == 0x7f || c1) {
-            std::array<char, 8> hex{};
-            std::snprintf(hex.data(), hex.size(), "\\x%02x", static_cast<unsigned>(byte));
-            out += hex.data();
-            ++i;
-        } else {
-            out += text.substr(i, length);
-            i += length;
-        }
+    while (!text.empty()) {
+        const std::size_t length = std::max<std::size_t>(sequence_length(text), 1);
+        const std::string next = shown(text.substr(0, length));
+        if (out.size() + next.size() > longest) return out + "...";
+        out += next;
+        text.remove_prefix(length);
     }
-    return i < text.size() ? out + "..." : out;
+    return out;
 }
 
 std::string_view without_byte_order_mark(std::string_view text) noexcept {

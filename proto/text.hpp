@@ -7,9 +7,12 @@
 
 namespace vibrig::proto {
 
-inline constexpr std::size_t kQuotedLength = 40;
-/// What is quoted in an error message, or shown: cut to a readable length, what a terminal obeys
-/// and foreign bytes as \xNN.
+/// Bytes of what is quoted in a message; of a line of a log or an audit.
+inline constexpr std::size_t kQuotedLength = 40, kLongestLine = 1000;
+
+/// What came from outside, fit for a message, a log and a terminal: one line of UTF-8. Control
+/// characters, line separators and those that turn the direction of writing are escaped, as \n,
+/// \x1b, \u202e; bytes that are not UTF-8 as \xff. At most `longest` bytes and "...".
 [[nodiscard]] std::string printable(std::string_view text, std::size_t longest = kQuotedLength);
 [[nodiscard]] std::string_view without_byte_order_mark(std::string_view text) noexcept;
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;

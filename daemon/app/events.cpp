@@ -5,7 +5,7 @@
 #include <chrono>
 #include <utility>
 
-#include "daemon/serve/one_line.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig {
 
@@ -34,7 +34,7 @@ void Events::enter(Severity severity, const std::string& source, const std::stri
     record.severity = severity;
     record.source = source;
     // Every event comes through here, and much of what they say comes from outside.
-    record.text = serve::one_line(text);
+    record.text = proto::printable(text, proto::kLongestLine);
     list_.append(record);
     if (journal_ != nullptr) journal_->event(record);
     if (recorder_ != nullptr) recorder_->event(record);

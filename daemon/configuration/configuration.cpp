@@ -16,6 +16,7 @@
 #include "daemon/configuration/nearest.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::configuration {
 
@@ -127,7 +128,7 @@ toml::table parse_toml(const std::string& text, const std::string& name) {
         const Place place = place_of(error.source());
         throw ConfigurationError(name + ":" + std::to_string(place.line) + ":" +
                                  std::to_string(place.column) +
-                                 ": not TOML: " + printable(std::string(error.description()), 300));
+                                 ": not TOML: " + proto::printable(error.description(), 300));
     }
 }
 

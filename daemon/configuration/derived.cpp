@@ -276,8 +276,7 @@ void derive_campaign(Configuration& c, const std::filesystem::path& folder, cons
             take_plan(c);
             cover_frequencies(c);
         } catch (const plan::PlanFileError& error) {
-            problems.add(places.at("campaign.plan"), "campaign.plan", error.what(),
-                         "a plan for this rig");
+            problems.add(places.at("campaign.plan"), "campaign.plan", error.what(), "");
         }
     }
     to_readings(c);

@@ -9,6 +9,7 @@
 
 #include "daemon/configuration/problems.hpp"
 #include "daemon/configuration/value.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::configuration {
 
@@ -147,7 +148,7 @@ std::optional<std::vector<std::string>> read_names(const Entry& entry, std::size
     for (std::size_t i = 0; i < array->size(); ++i) {
         const auto* one = array->get(i)->as_string();
         const bool fits = one != nullptr && !one->get().empty() && one->get().size() <= 40 &&
-                          printable(one->get()) == one->get();
+                          proto::printable(one->get(), kQuotedValue) == one->get();
         if (!fits || std::ranges::find(value, one->get()) != value.end()) {
             entry.element(i).refuse("a name of 1 to 40 printable characters, each once");
             return std::nullopt;

@@ -1,10 +1,10 @@
 #include "daemon/configuration/problems.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <limits>
 #include <utility>
+
+#include "proto/text.hpp"
 
 namespace vibrig::configuration {
 
@@ -43,32 +43,14 @@ std::string Problems::text(const std::string& file) const {
             text += ":" + std::to_string(problem.place.line) + ":" +
                     std::to_string(problem.place.column);
         }
-        text += ": " + (problem.key.empty() ? "" : printable(problem.key, 120) + ": ") + "found " +
-                problem.found + ", expected " + problem.expected;
+        text += ": " + (problem.key.empty() ? "" : proto::printable(problem.key, 120) + ": ") +
+                "found " + problem.found + (problem.expected.empty() ? "" : ", expected ") +
+                problem.expected;
     }
     if (sorted.size() > kShown) {
         text += "\n" + file + ": and " + std::to_string(sorted.size() - kShown) + " more";
     }
     return text;
-}
-
-std::string printable(const std::string& text, std::size_t at_most) {
-    std::string out;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        // Never cut within a UTF-8 sequence.
-        const auto byte = static_cast<unsigned char>(text[i]);
-        if (i >= at_most && (byte & 0xc0U) != 0x80U) {
-            return out + "...";
-        }
-        if (byte < 0x20 || byte == 0x7f) {
-            std::array<char, 8> escaped{};
-            std::snprintf(escaped.data(), escaped.size(), "\\x%02x", static_cast<unsigned>(byte));
-            out += escaped.data();
-        } else {
-            out += text[i];
-        }
-    }
-    return out;
 }
 
 }  // namespace vibrig::configuration

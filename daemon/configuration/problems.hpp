@@ -17,7 +17,7 @@ struct Problem {
     Place place;
     std::string key;
     std::string found;
-    std::string expected;
+    std::string expected;  ///< empty: `found` says it
 };
 
 /// Everything wrong with one file, so that a person mends it in one go.
@@ -35,7 +35,7 @@ class Problems {
     std::vector<Problem> problems_;
 };
 
-/// Fit for a terminal: control characters escaped, cut after a while.
-[[nodiscard]] std::string printable(const std::string& text, std::size_t at_most = 60);
+/// Bytes of a value that is quoted.
+inline constexpr std::size_t kQuotedValue = 60;
 
 }  // namespace vibrig::configuration

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "proto/text.hpp"
+
 namespace vibrig::configuration {
 
 Place place_of(const toml::source_region& source) {
@@ -59,7 +61,7 @@ std::string write_text(const std::string& value) {
 std::string describe(const toml::node& node) {
     switch (node.type()) {
         case toml::node_type::string:
-            return "\"" + printable(node.as_string()->get()) + "\" (a string)";
+            return "\"" + proto::printable(node.as_string()->get(), kQuotedValue) + "\" (a string)";
         case toml::node_type::integer:
             return std::to_string(node.as_integer()->get());
         case toml::node_type::floating_point:
@@ -124,7 +126,9 @@ std::optional<std::string> Entry::text(const std::string& kind, const TextRule& 
     const auto* value = node.as_string();
     const std::string expected = value == nullptr ? kind : rule(value->get());
     if (expected.empty()) return value->get();
-    refuse(value == nullptr ? describe(node) : "\"" + printable(value->get()) + "\"", expected);
+    refuse(value == nullptr ? describe(node)
+                            : "\"" + proto::printable(value->get(), kQuotedValue) + "\"",
+           expected);
     return std::nullopt;
 }
 

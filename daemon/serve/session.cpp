@@ -18,7 +18,7 @@
 #include <utility>
 
 #include "daemon/serve/expiry_watch.hpp"
-#include "daemon/serve/one_line.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::serve {
 namespace {
@@ -226,7 +226,8 @@ class Session : public std::enable_shared_from_this<Session> {
             who.expired = left_of(expires) <= std::chrono::seconds(0);
             // It goes into the audit.
             const std::string from = who.identity;
-            who.identity = "certificate " + one_line(name) + ", " + name_of(who.role);
+            who.identity = "certificate " + proto::printable(name, proto::kLongestLine) + ", " +
+                           name_of(who.role);
             self->certificate_ =
                 std::make_shared<const CertificateStatus>(CertificateStatus{who.identity, expires});
             if (!who.expired) self->shared_.clients.push_back(self->certificate_);

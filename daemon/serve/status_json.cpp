@@ -7,10 +7,10 @@
 #include <set>
 #include <stdexcept>
 
-#include "daemon/serve/one_line.hpp"
 #include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_message.hpp"
 #include "estimator/identification/result.hpp"
+#include "proto/text.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {
@@ -36,7 +36,7 @@ void check_line(const std::string& field, const std::string& text, std::size_t l
         throw std::invalid_argument(field + ": " + std::to_string(text.size()) +
                                     " bytes, expected " + std::to_string(longest) + " at most");
     }
-    if (one_line(text, longest) != text) {
+    if (proto::printable(text, longest) != text) {
         throw std::invalid_argument(field + ": contains a control character, expected one line");
     }
 }
