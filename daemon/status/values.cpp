@@ -357,7 +357,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("recorder.entries_dropped", "", [](auto& s) { return s.recorder.entries_dropped; }),
 
     row("estimate.amplitude_g", "g", [](auto& s) { return s.estimate.amplitude_g; })
-        .shown("vibration", "newest dwell: {} on the platform").with_decimals(4),
+        .shown("vibration", "newest dwell {}").with_decimals(4),
     row("estimate.frequency_hz", "Hz", [](auto& s) { return s.estimate.frequency_hz; })
         .shown("vibration", "{}").with_decimals(3).unless("vibration.words"),
     row("estimate.kappa", "", [](auto& s) { return s.estimate.kappa; }),

@@ -384,7 +384,7 @@ def check_page(checks, rig, page, address, remote, pki):
     checks.check(0 < size < LARGEST_PAGE, f"it is smaller than {LARGEST_PAGE} bytes", f"{size} bytes")
     until("single values stand in the lines of their table", "['samples', 'dropped', 'vibration'].every((line, i) => "
           "[...document.querySelectorAll('#links dt')].some(e => e.textContent === line && "
-          "[/^\\d+ taken/, /kernel \\d+, .*ring \\d+/, /g on the platform, [0-9.–]+ Hz/][i].test(e.nextSibling.textContent)))")
+          "[/^\\d+ taken/, /kernel \\d+, .*ring \\d+/, /newest dwell [0-9.–]+ g, [0-9.–]+ Hz/][i].test(e.nextSibling.textContent)))")
     checks.check(page.ask("evaluate", script="document.getElementById('stop').disabled").get("value") is True,
                  "on plain HTTP nobody can stop the rig")
     checks.check("Not the emergency stop" in page.ask("text", selector="#stop-note").get("value", ""),

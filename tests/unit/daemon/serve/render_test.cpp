@@ -58,7 +58,7 @@ TEST(Render, ShowsWhatCountsOnAWideTerminal) {
                              "EMERGENCY STOP OPEN",
                              "fault bits 0x0004",
                              "link degraded",
-                             "5.9900 g on the platform",
+                             "newest dwell 5.9900 g",
                              "31.25 degC",
                              "40.0 samples/s, 240.0 frames/s, rig time x 37.0",
                              "kernel 26",
