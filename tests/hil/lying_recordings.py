@@ -76,6 +76,8 @@ class Case:
         os.makedirs(os.path.join(self.out, "archive"))
         with open(os.path.join(self.out, "paper.toml"), "w", encoding="ascii") as file:
             file.write(PAPER)
+        with open(os.path.join(self.out, "leaks"), "w", encoding="ascii") as file:
+            file.write("leak:libhdf5\n")   # it forgets a hundred bytes of a page with a wrong checksum
 
     def limit(self):
         r.die_with_parent()
@@ -89,7 +91,7 @@ class Case:
         """What is wrong with how it is read; empty: nothing."""
         arguments = READERS[reader](self)
         environment = {**os.environ, "NO_COLOR": "1", "ASAN_OPTIONS": f"hard_rss_limit_mb={MEMORY >> 20}:max_allocation_size_mb={MEMORY >> 20}",
-                       "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1"}
+                       "LSAN_OPTIONS": f"suppressions={self.out}/leaks:print_suppressions=0", "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1"}
         try:
             run = subprocess.run([self.program, *arguments], stdin=subprocess.DEVNULL, capture_output=True, cwd=self.out,
                                  timeout=TIME_S, preexec_fn=self.limit, env=environment)
