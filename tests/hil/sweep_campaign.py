@@ -203,6 +203,7 @@ def aborted(checks, programs, folder):
         rest = rig.wait_for(lambda s: s["shaker"]["measured_g"] == 0 and not s["shaker"]["running"], 60)
         checks.check(last and last["campaign"]["state"] == "aborted" and rest, "aborted in a sweep, the table comes to rest",
                      f"{r.state_of(last)}\n{rig.daemon.text()[-2000:]}")
+        last = rig.wait_for(lambda s: s["campaign"]["dwells"], 20)   # closed a moment after the state has changed
         checks.equal([(d["used"], d["reason"]) for d in (last or rig.status())["campaign"]["dwells"]],
                      [(0, "a sweep that was cut short: not used")], "and the status says that the sweep is not used, and why")
     finally:
