@@ -12,8 +12,9 @@ namespace {
 
 /// A longer gap is treated as a change of position: the angles start afresh.
 constexpr double kLongestPause_s = 1.0;
-/// Readings in it, where their times lie and leave room for millions.
-constexpr double kMostMissing = kLongestPause_s * VibrationLevel::kHighestRate_hz;
+/// More readings than are missing in it at 10 kHz, where their times lie and leave room for
+/// millions.
+constexpr double kMostMissing = 20'000;
 /// So many stamps in a row before the newest accepted one mean that that one was wrong.
 constexpr int kBadTimesBeforeRestart = 5;
 constexpr auto kBufferCapacity =

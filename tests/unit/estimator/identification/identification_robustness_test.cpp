@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <string>
 
@@ -341,11 +340,10 @@ TEST(Robustness, ADwellWhoseVibrationStartsLateIsTakenOut) {
     expect_within_four_sigma(result);
 }
 
-/// As a recording may lie: a million readings would be missing between two.
+/// As a recording may lie: 10^9 readings would be missing between two, and it would never end.
 TEST(Robustness, ReadingsANanosecondApartAndGapsBetweenThemAreTaken) {
     Identification identification{Settings{}};
     identification.begin_dwell({1, 1});
-    const std::clock_t begin = std::clock();
     double time_s = 0;
     for (int i = 0; i < 20'000; ++i) {
         time_s += i % 2000 == 1999 ? 0.9 : 1e-9;
@@ -356,7 +354,6 @@ TEST(Robustness, ReadingsANanosecondApartAndGapsBetweenThemAreTaken) {
                                               .force_good = true}));
     }
     EXPECT_EQ(identification.end_dwell().samples, 20'000U);
-    EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 10);
 }
 
 }  // namespace
