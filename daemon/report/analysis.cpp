@@ -333,8 +333,8 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
         plan.push_back(planned);
     }
     out.expected_sigma.fill(std::numeric_limits<double>::infinity());
-    // Of readings closer together than any rig's it would be a sum of billions.
-    constexpr double kShortest_s = 1e-4;
+    // Of readings closer together than any rig's (10 kHz) it would be a sum of billions.
+    constexpr double kShortest_s = 1e-5;
     if (const double period_s = period_of(campaign, dwells);
         !plan.empty() && period_s > kShortest_s) {
         out.expected_sigma =
