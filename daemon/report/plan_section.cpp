@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -23,13 +24,11 @@ namespace {
 
 constexpr double kSameDirection = 0.02;  // a degree or so: where the gimbals stop is not exact
 
-/// What the encoders show at the beginning of a dwell, deg; 0 where that is no number.
+/// What the encoders show at the beginning of a dwell that has samples, deg.
 planning::Vec3 position_of(const Campaign& campaign, const record::RecordedDwell& dwell) {
     planning::Vec3 position{};
     for (std::size_t k = 0; k < 3; ++k)
         position[k] = campaign.samples[dwell.first].angle[k] * estimator::kDegPerRad;
-    for (double& angle : position)
-        if (!std::isfinite(angle)) angle = 0;
     return position;
 }
 
@@ -54,7 +53,11 @@ PlanFigures plan_figures(const Campaign& campaign, const Analysis& analysis) {
     std::set<std::array<long, 3>> directions;
     for (std::size_t d = 0; d < count; ++d) {
         if (dwells[d].count == 0) continue;
-        const auto up = planning::up_at(analysis.settings, position_of(campaign, dwells[d]));
+        const auto position = position_of(campaign, dwells[d]);
+        // As a recording may lie: a dwell that is nowhere is none of the plan.
+        if (!std::ranges::all_of(position, [](double angle) { return std::isfinite(angle); }))
+            continue;
+        const auto up = planning::up_at(analysis.settings, position);
         run.points.push_back({planning::vibration_row(up, level_of(dwells[d].order->table_g))});
         effort.push_back(drivers::to_seconds(dwells[d].order->to - dwells[d].order->from));
         directions.insert({std::lround(up[0] / kSameDirection), std::lround(up[1] / kSameDirection),
