@@ -33,8 +33,7 @@ inline constexpr drivers::Time kLongestDwell = 2 * 86'400 * drivers::kSecond;
 
 /// A text that is printed sooner or later, on terminals too.
 [[nodiscard]] inline std::string shown(std::string_view text) {
-    constexpr std::size_t kLongest = 1000;
-    return proto::printable(text, kLongest);
+    return proto::printable(text, proto::kLongestLine);
 }
 
 /// Of a column of whole numbers: those that its field can hold, `width` in a row. Flags and words
