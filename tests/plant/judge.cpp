@@ -25,9 +25,10 @@ void judge_one(JudgedCoefficient& c, const Json* entry, double limit) {
         return;
     }
     c.estimate = number_or_nan(*entry, "value");
-    // Of a result with a budget sigma belongs to value_constant; value's own deviation is u.
-    const double u = number_or_nan(*entry, "u");
-    c.sigma = std::isnan(u) ? number_or_nan(*entry, "sigma") : u;
+    // Where there is an assessment sigma belongs to value_constant, and u_a to value. Not u: it has
+    // room for errors of the rig that a simulated one does not have unless somebody wants them.
+    const double u_a = number_or_nan(*entry, "u_a");
+    c.sigma = std::isnan(u_a) ? number_or_nan(*entry, "sigma") : u_a;
     c.ratio = (c.estimate - c.truth) / c.sigma;
     const auto observable = entry->find("observable");
     const auto unit = entry->find("unit");

@@ -12,7 +12,7 @@ struct JudgedCoefficient {
     std::string unit;
     double truth = 0;
     double estimate = 0;  ///< NaN: not there
-    double sigma = 0;     ///< of the estimate: u, or sigma where there is no u
+    double sigma = 0;     ///< of the estimate: u_a, or sigma where there is no u_a
     double ratio = 0;     ///< (estimate - truth) / sigma
     std::string fault;    ///< empty: within the limit
 };

@@ -27,7 +27,7 @@ void add_judge_command(CLI::App& app, int& exit_code) {
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
     command
         ->add_option("--sigma", o->sigma,
-                     "largest error in standard deviations: u, or sigma where there is no u")
+                     "largest error in standard deviations: u_a, or sigma where there is none")
         ->check(proto::finite(0.1, 1000.0))
         ->capture_default_str();
     command->footer(

@@ -61,14 +61,15 @@ TEST(Judge, TakesTheDeviationThatBelongsToTheValue) {
     nlohmann::json root = perfect();
     for (auto& parameter : root["parameters"]) {
         parameter["value"] = parameter["value"].get<double>() + 0.005;
-        parameter["u"] = 0.002;
+        parameter["u_a"] = 0.002;
+        parameter["u"] = 0.5;  // with room for errors that nobody gave the rig
     }
-    // THEN each is 3 u off, not 6 sigma
+    // THEN each is 3 u_a off, not 6 sigma, nor nothing of u
     EXPECT_TRUE(judged(root).passed);
     EXPECT_NEAR(judged(root).coefficients[7].ratio, 3, 1e-9);
     EXPECT_FALSE(judged(root, 2.9).passed);
     // AND one without a budget is judged by sigma
-    root["parameters"][7]["u"] = nullptr;
+    root["parameters"][7]["u_a"] = nullptr;
     EXPECT_FALSE(judged(root).passed);
 }
 
