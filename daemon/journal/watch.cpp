@@ -167,7 +167,9 @@ std::string Watch::changed_files(Files& files) const {
         return fmt::format("{}: was cut from {} to {} bytes while the daemon ran", path_,
                            files.file.size, file.size);
     }
-    if (auto why = compare(path_ + "-wal", files.log, log); !why.empty()) return why;
+    // A reader of the watch's own that opens after a deletion makes another log.
+    if (!compare(path_, files.log, log).empty())
+        return path_ + "-wal: was deleted or replaced while the daemon ran";
     if (auto why = compare(path_ + kKeySuffix, files.key, key); !why.empty()) return why;
     const Identity& was = files.key;
     if (key.mode != was.mode || key.owner != was.owner || key.size != was.size)

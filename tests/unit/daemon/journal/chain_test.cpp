@@ -457,7 +457,7 @@ std::vector<Harm> harms_while_it_runs(const ChainTest& test) {
          },
          "was replaced by another file"},
         {"cut", [=] { fs::resize_file(path, 100); }, "was cut from"},
-        {"its log deleted", [=] { fs::remove(path + "-wal"); }, "-wal: was deleted"},
+        {"its log deleted", [=] { fs::remove(path + "-wal"); }, "-wal: was deleted or replaced"},
         {"its head deleted", [=] { fs::remove(path + kHeadSuffix); }, ".head: was deleted"},
         {"its key deleted", [=] { fs::remove(key); }, ".key: was deleted"},
         {"its key opened", [=] { ::chmod(key.c_str(), 0644); }, "or opened to others"},
