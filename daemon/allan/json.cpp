@@ -3,6 +3,7 @@
 
 #include "daemon/allan/analysis.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -164,7 +165,7 @@ std::string allan_json(const AllanAnalysis& analysis) {
         root["dynamic"] = dynamic_json(analysis);
     }
     root["warnings"] = analysis.warnings;
-    return root.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return proto::json_text(root);
 }
 
 std::string allan_window_json(const allan::WindowRow& row, const std::vector<allan::Alarm>& alarms,

@@ -1,6 +1,7 @@
 // What the tool for commissioning asks: of the procedure, and of the record.
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/bus_bits.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig {
 
@@ -47,7 +48,7 @@ std::string ControlLoop::read_commissioning(const Json& what) {
                      {"configuration", loaded_.path},
                      {"progress", commissioning_.progress()},
                      {"procedure", commissioning_.state(after)}};
-    return reply.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return proto::json_text(reply);
 }
 
 }  // namespace vibrig

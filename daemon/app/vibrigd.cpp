@@ -223,7 +223,7 @@ int main(int argc, char** argv) {
     vibrig::rt::give_large_blocks_back();
     CLI::App app{"Acquisition and identification daemon for vibration rigs", "vibrigd"};
     app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");
-    app.set_version_flag("--version", vibrig::kVersion);
+    app.set_version_flag("--version", std::string("vibrigd ") + vibrig::kVersion);
     std::string path;
     bool check = false;
     app.add_option("--config", path, "configuration file (TOML); all defaults without one");

@@ -16,6 +16,7 @@
 
 #include "daemon/commission/record.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::commission {
 
@@ -96,7 +97,7 @@ void TrialLog::add(const char* what, Json data) {
               {"identity", identity()},
               {"what", what}};
     line.update(std::move(data));
-    const std::string text = line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    const std::string text = proto::json_text(line) + "\n";
     if (::write(file_, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
         ::fdatasync(file_) != 0)
         cannot(path_, "be written");

@@ -9,6 +9,7 @@
 #include "daemon/plan/adaptive.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::plan {
 
@@ -69,15 +70,14 @@ std::string to_json(const TypePrior& prior) {
                                 {"between_campaigns", std::sqrt(of.within(k, k))},
                                 {"expected_sigma", std::sqrt(of.predicted(k, k))}});
     }
-    return OrderedJson{{"type", prior.type},
-                       {"simulated", prior.simulated},
-                       {"units", of.units},
-                       {"campaigns", of.campaigns},
-                       {"coefficients", std::move(coefficients)},
-                       {"covariance_between_units", lower_triangle(of.between)},
-                       {"covariance_between_campaigns", lower_triangle(of.within)},
-                       {"covariance_expected", lower_triangle(of.predicted)}}
-        .dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
+    return proto::json_text(OrderedJson{{"type", prior.type},
+                                        {"simulated", prior.simulated},
+                                        {"units", of.units},
+                                        {"campaigns", of.campaigns},
+                                        {"coefficients", std::move(coefficients)},
+                                        {"covariance_between_units", lower_triangle(of.between)},
+                                        {"covariance_between_campaigns", lower_triangle(of.within)},
+                                        {"covariance_expected", lower_triangle(of.predicted)}});
 }
 
 TypePrior type_prior_of(const std::string& json) {

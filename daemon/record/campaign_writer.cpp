@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "daemon/record/campaign_columns.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::record {
 
@@ -32,7 +33,7 @@ std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
                                       {"dwells_before", head.dwells_before},
                                       {"channels", channel_names().now},
                                       {"units", units}};
-    return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    return proto::json_text(json);
 }
 
 /// Under another name until others can open it: whoever is killed meanwhile leaves nothing that
@@ -54,9 +55,7 @@ void write_end(File& file, const Ended& ended) {
                                       {"reason", ended.reason},
                                       {"mark", ended.mark},
                                       {"ended_utc_ns", std::to_string(ended.utc_ns)}};
-    file.write_text("/ended",
-                    json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
-                    "how it ended, JSON, as in the attributes");
+    file.write_text("/ended", proto::json_text(json), "how it ended, JSON, as in the attributes");
 }
 
 CampaignWriter::CampaignWriter(const std::string& path, const Head& head)

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "estimator/filter/angles.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::record {
 
@@ -147,7 +148,7 @@ std::size_t PreTrip::write(const Cause& cause, const std::string& path) const {
     std::ofstream file(path, std::ios::trunc);
     const auto put = [&file](const nlohmann::ordered_json& line) {
         // A text from a file or a person may hold anything.
-        file << line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+        file << proto::json_text(line) << '\n';
     };
     const auto recent = [&cause](Time time) { return time >= cause.time - kSpan; };
     put({{"trip", cause.name},

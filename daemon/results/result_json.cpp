@@ -8,6 +8,7 @@
 #include "daemon/results/spectrum_json.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "estimator/uncertainty/with_type.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -168,7 +169,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     root["compiler"] = estimator::compiler();
     root["simulated"] = simulated;
     // A warning may carry bytes of a file; a broken sequence must not cost the result.
-    return root.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return proto::json_text(root);
 }
 
 bool all_observable(const estimator::Result& result) {

@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
     vibrig::plant::add_run_command(app, exit_code);
     vibrig::plant::add_record_command(app, exit_code);
     vibrig::plant::add_judge_command(app, exit_code);
+    app.set_version_flag("--version", "vibrig-plant " VIBRIG_VERSION);
     bool print_dbc = false;
     app.add_flag("--print-dbc", print_dbc, "print the built-in rig.dbc, and end");
     vibrig::proto::refuse_empty_values(app);
@@ -43,7 +44,7 @@ int main(int argc, char** argv) {
         // "vibrig-plant --can ..." means run.
         std::vector<std::string> arguments(argv + 1, argv + argc);
         const std::string first = arguments.empty() ? "--help" : arguments.front();
-        if (first.starts_with("-") && first != "-h" && first != "--help")
+        if (first.starts_with("-") && first != "-h" && first != "--help" && first != "--version")
             arguments.insert(arguments.begin(), "run");
         if (arguments.empty()) arguments.emplace_back("run");
         std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them

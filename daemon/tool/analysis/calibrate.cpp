@@ -16,6 +16,7 @@
 #include "estimator/allan/edf.hpp"
 #include "estimator/plan/calibration.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool::calibration {
 
@@ -65,11 +66,13 @@ void read(const Options& options, Study& study) {
                                   row[column[3]],
                                   sigma ? row[*sigma] : options.sigma};
         if (sigma && !(reading.sigma > 0))
-            plan::refuse(place + ": column sigma", Json(reading.sigma).dump(), "above 0");
+            plan::refuse(place + ": column sigma", proto::json_text(Json(reading.sigma)),
+                         "above 0");
         if (count) {
             // A mean of so many readings.
             if (!(row[*count] >= 1))
-                plan::refuse(place + ": column count", Json(row[*count]).dump(), "1 or more");
+                plan::refuse(place + ": column count", proto::json_text(Json(row[*count])),
+                             "1 or more");
             if (!(reading.sigma > 0) && row[*count] != 1)
                 plan::refuse(place + ": column count", "a mean without a sigma",
                              "--sigma or a column sigma, of one reading");
@@ -145,18 +148,17 @@ std::string json_text(const Study& study) {
             row.push_back(proto::number_or_null(r.covariance(i, j)));
         covariance.push_back(std::move(row));
     }
-    return Json{{"coefficients", std::move(coefficients)},
-                {"covariance", std::move(covariance)},
-                {"rank", r.plan.rank},
-                {"condition", proto::number_or_null(r.plan.condition)},
-                {"null_vectors", std::move(null)},
-                {"readings", study.readings.size()},
-                {"degrees_of_freedom", r.degrees},
-                {"noise", proto::number_or_null(r.noise)},
-                {"test", test_json(study)},
-                {"residuals", std::move(residuals)},
-                {"warnings", study.warnings}}
-        .dump(-1, ' ', false, Json::error_handler_t::replace);
+    return proto::json_text(Json{{"coefficients", std::move(coefficients)},
+                                 {"covariance", std::move(covariance)},
+                                 {"rank", r.plan.rank},
+                                 {"condition", proto::number_or_null(r.plan.condition)},
+                                 {"null_vectors", std::move(null)},
+                                 {"readings", study.readings.size()},
+                                 {"degrees_of_freedom", r.degrees},
+                                 {"noise", proto::number_or_null(r.noise)},
+                                 {"test", test_json(study)},
+                                 {"residuals", std::move(residuals)},
+                                 {"warnings", study.warnings}});
 }
 
 std::string table_text(const Study& study) {

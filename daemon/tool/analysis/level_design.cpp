@@ -7,6 +7,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/tool/analysis/level_options.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool::level_command {
 
@@ -73,18 +74,18 @@ int run_design(const Options& options) {
         for (const auto& root : roots) {
             root_list.push_back({{"re", root.real()}, {"im", root.imag()}});
         }
-        std::cout << Json{{"gains", gains_json(gains)},
-                          {"sigma", sigma},
-                          {"x", proto::number_or_null(sigma * loop.settling_s)},
-                          {"roots", root_list},
-                          {"routh",
-                           {{"K1_times_1_plus_K2", gains.k1 * (1 + gains.k2)}, {"K3", gains.k3}}},
-                          {"longest_period_s", levelling::kMostStep / sigma},
-                          {"declared_within_s", declared ? Json(*declared) : Json(nullptr)},
-                          {"tolerance_arcmin", leveller.tolerance() / kRadPerArcmin},
-                          {"noise", budget_json(leveller)},
-                          {"message", leveller.message()}}
-                         .dump()
+        std::cout << proto::json_text(Json{
+                         {"gains", gains_json(gains)},
+                         {"sigma", sigma},
+                         {"x", proto::number_or_null(sigma * loop.settling_s)},
+                         {"roots", root_list},
+                         {"routh",
+                          {{"K1_times_1_plus_K2", gains.k1 * (1 + gains.k2)}, {"K3", gains.k3}}},
+                         {"longest_period_s", levelling::kMostStep / sigma},
+                         {"declared_within_s", declared ? Json(*declared) : Json(nullptr)},
+                         {"tolerance_arcmin", leveller.tolerance() / kRadPerArcmin},
+                         {"noise", budget_json(leveller)},
+                         {"message", leveller.message()}})
                   << '\n';
     } else {
         std::cout << printed("K1 = %.6g 1/s, K2 = %.6g, K3 = %.6g 1/s\n", gains.k1, gains.k2,

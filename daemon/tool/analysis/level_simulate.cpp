@@ -10,6 +10,7 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/analysis/level_options.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool::level_command {
 
@@ -122,17 +123,17 @@ int run_many(const Options& options) {
     const double tolerance = levelling::Leveller(loop).tolerance();
     const ManyStarts many = simulate_many(options, loop, tolerance);
     if (options.json) {
-        std::cout << Json{{"runs", options.runs},
-                          {"settled", many.times.size()},
-                          {"late", many.late},
-                          {"false", many.falsely},
-                          {"bound_s", many.bound},
-                          {"median_s", proto::number_or_null(many.time_within(0.5))},
-                          {"p95_s", proto::number_or_null(many.time_within(0.95))},
-                          {"longest_s", proto::number_or_null(many.time_within(1))},
-                          {"worst_tilt_arcmin", many.worst_tilt / kRadPerArcmin},
-                          {"tolerance_arcmin", tolerance / kRadPerArcmin}}
-                         .dump()
+        std::cout << proto::json_text(
+                         Json{{"runs", options.runs},
+                              {"settled", many.times.size()},
+                              {"late", many.late},
+                              {"false", many.falsely},
+                              {"bound_s", many.bound},
+                              {"median_s", proto::number_or_null(many.time_within(0.5))},
+                              {"p95_s", proto::number_or_null(many.time_within(0.95))},
+                              {"longest_s", proto::number_or_null(many.time_within(1))},
+                              {"worst_tilt_arcmin", many.worst_tilt / kRadPerArcmin},
+                              {"tolerance_arcmin", tolerance / kRadPerArcmin}})
                   << '\n';
     } else {
         std::cout << printed(
@@ -181,7 +182,7 @@ int run_simulate(const Options& options) {
             result["noise"] = budget_json(leveller);
             result["message"] = run.message;
         }
-        std::cout << result.dump() << '\n';
+        std::cout << proto::json_text(result) << '\n';
     } else {
         std::cout << printed("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
                              end[0] / kRadPerArcmin, end[1] / kRadPerArcmin);

@@ -19,6 +19,7 @@
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "proto/json_file.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -208,7 +209,7 @@ std::string predicted_json(const Predicted& of) {
           {"refusal", of.refusal.empty() ? PredictionJson(nullptr) : PredictionJson(of.refusal)},
           {"attitudes", attitudes_json(of.prediction, of.deg)},
           {"verification", std::move(verification)}}}};
-    return root.dump() + "\n";
+    return proto::json_text(root) + "\n";
 }
 
 std::string predicted_text(const Predicted& of) {
@@ -307,7 +308,7 @@ Predicted predict_for(const PredictOptions& options) {
 
 int run_predict(const PredictOptions& options) {
     if (options.list) {
-        std::cout << (options.json ? profiles_json().dump() + "\n" : profiles_text());
+        std::cout << (options.json ? proto::json_text(profiles_json()) + "\n" : profiles_text());
         return 0;
     }
     const Predicted of = predict_for(options);

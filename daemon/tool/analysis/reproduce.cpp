@@ -19,6 +19,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/tool/commands.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -215,7 +216,7 @@ int run(const std::string& name, const ReproduceOptions& options, bool as_json) 
         }
     }
     if (as_json) {
-        std::cout << Json{{"reproductions", std::move(list)}}.dump() << '\n';
+        std::cout << proto::json_text(Json{{"reproductions", std::move(list)}}) << '\n';
     }
     return all_agree ? 0 : kDisagrees;
 }

@@ -12,6 +12,7 @@
 #include "daemon/tool/analysis/uncertainty_text.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -56,7 +57,7 @@ std::string budget_json(const Identified& of, const uncertainty::MonteCarlo* dra
     Json out{{"coefficients", std::move(list)}, {"leverage", leverage_json(of.assessed)}};
     out.update(root);
     if (drawn != nullptr) out["monte_carlo"] = monte_carlo_json(*drawn);
-    return out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    return proto::json_text(out) + "\n";
 }
 
 std::size_t coefficient_number(const std::string& name) {

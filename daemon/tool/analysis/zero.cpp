@@ -16,6 +16,7 @@
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
+#include "proto/json_text.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::zero_command {
@@ -93,7 +94,7 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
         if (apart) {
             json["apart"] = apart_json(*apart);
         }
-        std::cout << json.dump() << '\n';
+        std::cout << proto::json_text(json) << '\n';
     } else {
         std::cout << result_table(result, seen);
         if (apart) {

@@ -5,6 +5,7 @@
 #include "daemon/tool/design/plan_study.hpp"
 #include "estimator/level/coning.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -235,7 +236,7 @@ std::string plan_json(const PlanStudy& study) {
         }
         json["vertical_axes"] = std::move(axes);
     }
-    return json.dump();
+    return proto::json_text(json);
 }
 
 std::string plan_table(const PlanStudy& study) {

@@ -12,6 +12,7 @@
 #include "estimator/plan/optimum.hpp"
 #include "estimator/plan/spheres.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -163,7 +164,7 @@ std::string turntable_json(const TurntablePlan& plan) {
         {"growth", std::move(growth)},
         {"growth_exponent", plan.growth.empty() ? Json(nullptr) : Json(plan.growth_exponent)}};
     if (!complete) json["refusal"] = plan.refusal;
-    return json.dump();
+    return proto::json_text(json);
 }
 
 std::string turntable_table(const TurntablePlan& plan) {

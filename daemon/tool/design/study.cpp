@@ -13,6 +13,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "daemon/tool/design/study_submit.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -57,7 +58,7 @@ int plan(const StudyOptions& o) {
                        {"tasks", folder.tasks()},
                        {"points", folder.study.points()},
                        {"runs", folder.study.runs}};
-        std::cout << out.dump() << '\n';
+        std::cout << proto::json_text(out) << '\n';
     } else {
         std::cout << o.folder << ": " << folder.tasks() << " tasks, " << folder.study.points()
                   << (folder.study.points() == 1 ? " point of " : " points of ")
@@ -88,7 +89,7 @@ int run(const StudyOptions& o) {
                        {"now", report.now},
                        {"failed", report.failed},
                        {"complete", report.complete()}};
-        std::cout << out.dump() << '\n';
+        std::cout << proto::json_text(out) << '\n';
     } else {
         std::cout << report.before + report.now << " of " << report.all << " tasks done, "
                   << report.now << " of them now; " << report.failed << " failed\n";
@@ -101,7 +102,8 @@ int run(const StudyOptions& o) {
 int status(const StudyOptions& o) {
     const auto folder = study::open_study(o.folder);
     const auto found = study::status_of(folder);
-    std::cout << (o.json ? studies::status_json(found).dump() + "\n" : studies::status_text(found));
+    std::cout << (o.json ? proto::json_text(studies::status_json(found)) + "\n"
+                         : studies::status_text(found));
     return found.contradictions.empty() && found.foreign.empty() ? 0 : kNo;
 }
 
@@ -110,14 +112,14 @@ void tell(const char* what, const std::vector<std::string>& lines) {
 }
 
 void write_result(const StudyOptions& o, const Json& result) {
-    if (!o.output.empty()) plot::write_file(o.output, result.dump(1) + "\n");
+    if (!o.output.empty()) plot::write_file(o.output, proto::json_text(result, 1) + "\n");
     if (!o.csv.empty()) plot::write_file(o.csv, studies::result_csv(result));
     if (!o.hdf5.empty()) studies::write_hdf5(result, o.hdf5);
     if (!o.plot.empty()) {
         const std::string remark = studies::write_charts(result, o.plot);
         if (!remark.empty()) std::cerr << o.plot << ": " << remark << '\n';
     }
-    std::cout << (o.json ? result.dump(1) + "\n" : studies::result_table(result));
+    std::cout << (o.json ? proto::json_text(result, 1) + "\n" : studies::result_table(result));
 }
 
 int merge(const StudyOptions& o) {
@@ -160,7 +162,7 @@ int submit(const StudyOptions& o) {
     const auto folder = study::open_study(o.folder);
     const auto job = studies::submit_to_slurm(folder, o.shards, o.sbatch);
     if (o.json) {
-        std::cout << Json{{"job", job.id}, {"shards", job.shards}}.dump() << '\n';
+        std::cout << proto::json_text(Json{{"job", job.id}, {"shards", job.shards}}) << '\n';
     } else {
         std::cout << "job " << job.id << ": " << job.shards << " shards; `squeue -j " << job.id
                   << "`, `vibrig study status " << o.folder << "`\n";

@@ -32,6 +32,7 @@
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -232,7 +233,7 @@ void print_doubts(std::ostream& out, const CommissionJson& result) {
 int commission_rig(const CommissionOptions& options) {
     std::ostream& out = options.json ? std::cerr : std::cout;
     const CommissionJson result = Dialogue(options, out).run();
-    if (options.json) std::cout << result.dump(1) << '\n';
+    if (options.json) std::cout << proto::json_text(result, 1) << '\n';
     const bool decided = result["outcome"] == "decided";
     std::string head = mark_of(result) + result["outcome"].get<std::string>();
     std::ranges::transform(head, head.begin(),
@@ -258,7 +259,7 @@ int show_commission(const CommissionOptions& options) {
     serve::Client client(options.at);
     const auto state = commission_state(client, options.by, 0);
     const auto& record = state["record"];
-    if (options.json) std::cout << record.dump(1) << '\n';
+    if (options.json) std::cout << proto::json_text(record, 1) << '\n';
     bool all = true;
     // As the live page has it.
     if (const std::string now = state.value("progress", std::string());

@@ -23,6 +23,7 @@
 #include "drivers/can/can_port.hpp"
 #include "proto/candump.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -215,7 +216,7 @@ int find_signals(BusOptions options) {
         auto all = commission::to_json(found);
         all["simulated"] = simulated;
         all["by"] = options.by;
-        std::cout << all.dump(1) << '\n';
+        std::cout << proto::json_text(all, 1) << '\n';
     }
     std::ostream& out = options.json ? std::cerr : std::cout;
     if (found.outcome != commission::Finding::Outcome::decided) {
@@ -266,7 +267,7 @@ int list_bus(const BusOptions& options) {
     if (options.json) {
         auto all = commission::json_of(bus.bytes);
         if (bus.signals) all.update(commission::json_of(*bus.signals, turned));
-        std::cout << all.dump(1) << '\n';
+        std::cout << proto::json_text(all, 1) << '\n';
     } else {
         std::cout << commission::table_of(bus.bytes);
         if (bus.signals) std::cout << commission::table_of(*bus.signals, turned);

@@ -17,6 +17,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_registers.hpp"
 #include "drivers/shaker/modbus_link.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -157,11 +158,11 @@ int find_registers(const RegisterOptions& options) {
     }
     const char* outcome = all.empty() ? "unfinished" : one_each ? "decided" : "undecided";
     if (options.json)
-        std::cout << RegisterJson{{"outcome", outcome},
-                                  {"by", options.by},
-                                  {"device", device},
-                                  {"places", all}}
-                         .dump(1)
+        std::cout << proto::json_text(RegisterJson{{"outcome", outcome},
+                                                   {"by", options.by},
+                                                   {"device", device},
+                                                   {"places", all}},
+                                      1)
                   << '\n';
     if (!all.empty() && one_each) {
         out << "DECIDED. The other registers are the manual's; nothing is recorded: what they do\n"

@@ -7,6 +7,7 @@
 
 #include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/remote.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -125,11 +126,11 @@ int commission_shaker(const ShakerCommission& options) {
     if (!why.empty()) print_wrapped(out, "REFUSED: " + why);
     const char* outcome = !why.empty() ? "refused" : all ? "decided" : "undecided";
     if (options.json)
-        std::cout << CommissionJson{{"outcome", outcome},
-                                    {"why", why},
-                                    {"simulated", state["simulated"]},
-                                    {"parts", parts}}
-                         .dump(1)
+        std::cout << proto::json_text(CommissionJson{{"outcome", outcome},
+                                                     {"why", why},
+                                                     {"simulated", state["simulated"]},
+                                                     {"parts", parts}},
+                                      1)
                   << '\n';
     return all ? 0 : kNo;
 }

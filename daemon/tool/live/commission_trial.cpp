@@ -18,6 +18,7 @@
 #include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/commission_registers.hpp"
 #include "drivers/shaker/modbus_link.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -171,13 +172,13 @@ int try_registers(const RegisterOptions& options) {
                   std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
     }
     if (options.json) {
-        std::cout << CommissionJson{{"outcome", outcome},
-                                    {"why", why},
-                                    {"simulated", rig.simulated()},
-                                    {"by", options.by},
-                                    {"device", device},
-                                    {"rows", rows}}
-                         .dump(1)
+        std::cout << proto::json_text(CommissionJson{{"outcome", outcome},
+                                                     {"why", why},
+                                                     {"simulated", rig.simulated()},
+                                                     {"by", options.by},
+                                                     {"device", device},
+                                                     {"rows", rows}},
+                                      1)
                   << '\n';
     }
     if (!why.empty()) {

@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
 #include "daemon/tool/commands.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -19,6 +21,7 @@ namespace fs = std::filesystem;
 using serve::CertificateSettings;
 using serve::Identity;
 using serve::PkiError;
+using Json = nlohmann::ordered_json;
 
 struct PkiOptions {
     std::string folder = "vibrig-pki";
@@ -27,6 +30,7 @@ struct PkiOptions {
     int days = 825;
     std::string password;
     std::vector<std::string> revoked;
+    bool json = false;
 };
 
 constexpr const char* kAuthority = "authority";
@@ -75,16 +79,29 @@ void check_people(const PkiOptions& options) {
     }
 }
 
+/// For people, as it happens.
+void say(const PkiOptions& options, const std::string& line) {
+    if (!options.json) std::cout << line << std::endl;
+}
+
+/// For machines, at the end.
+int say_all(const PkiOptions& options, const Json& all) {
+    if (options.json) std::cout << proto::json_text(all) << std::endl;
+    return 0;
+}
+
 int init(const PkiOptions& options) {
     check_people(options);
     const fs::path folder = options.folder;
     fs::create_directories(folder);
     const auto valid_for = std::chrono::hours(24 * options.days);
     Identity authority;
+    Json all{{"folder", folder.string()}, {"authority", (folder / kAuthority).string() + ".crt"}};
     // A second call adds people to the same authority.
     if (fs::exists(folder / (std::string(kAuthority) + ".key"))) {
         authority = authority_in(folder);
-        std::cout << "authority: the one in " << folder.string() << '\n';
+        say(options, "authority: the one in " + folder.string());
+        all["authority_is_new"] = false;
     } else {
         authority = serve::make_identity({CertificateSettings::Use::authority,
                                           "Vibrig authority",
@@ -93,9 +110,12 @@ int init(const PkiOptions& options) {
                                           std::chrono::hours(-1),
                                           4 * valid_for});
         save(folder, kAuthority, authority);
-        std::cout << "authority: " << (folder / kAuthority).string()
-                  << ".crt; keep its key off the rig\n";
+        say(options,
+            "authority: " + (folder / kAuthority).string() + ".crt; keep its key off the rig");
+        all["authority_is_new"] = true;
     }
+    all["server"] = nullptr;
+    all["people"] = Json::array();
     const auto client = [&](const std::string& name, const std::string& role) {
         const Identity made = serve::make_identity(
             {CertificateSettings::Use::client, name, role, {}, std::chrono::hours(-1), valid_for},
@@ -103,25 +123,35 @@ int init(const PkiOptions& options) {
         save(folder, name, made);
         write(folder / (name + ".p12"),
               serve::pkcs12_of(made, authority.certificate, name, options.password), true);
-        std::cout << role << ": " << (folder / name).string() << ".crt, .key; .p12 for a browser\n";
+        const std::string file = (folder / name).string();
+        say(options, role + ": " + file + ".crt, .key; .p12 for a browser");
+        all["people"].push_back({{"name", name},
+                                 {"role", role},
+                                 {"certificate", file + ".crt"},
+                                 {"key", file + ".key"},
+                                 {"browser", file + ".p12"}});
     };
     if (!options.hosts.empty()) {
         save(folder, "server",
              serve::make_identity({CertificateSettings::Use::server, options.hosts.front(), "",
                                    options.hosts, std::chrono::hours(-1), valid_for},
                                   &authority));
-        std::cout << "server: " << (folder / "server").string() << ".crt, .key\n";
+        const std::string file = (folder / "server").string();
+        say(options, "server: " + file + ".crt, .key");
+        all["server"] = {
+            {"hosts", options.hosts}, {"certificate", file + ".crt"}, {"key", file + ".key"}};
     }
     for (const std::string& name : options.viewers) client(name, "viewer");
     for (const std::string& name : options.operators) client(name, "operator");
     for (const std::string& name : options.admins) client(name, "admin");
-    return 0;
+    return say_all(options, all);
 }
 
 int revoke(const PkiOptions& options) {
     const fs::path folder = options.folder;
     const fs::path list = folder / kRevoked;
     const Identity authority = authority_in(folder);
+    Json all{{"folder", folder.string()}, {"list", list.string()}, {"revoked", options.revoked}};
     for (const std::string& name : options.revoked) {
         const fs::path certificate = folder / (name + ".crt");
         if (name == kAuthority) throw PkiError("the authority cannot revoke itself");
@@ -144,10 +174,10 @@ int revoke(const PkiOptions& options) {
             std::error_code none;
             fs::rename(folder / (name + kind), aside / (name + kind), none);
         }
-        std::cout << name << ": revoked; its files are in " << aside.string() << '\n';
+        say(options, name + ": revoked; its files are in " + aside.string());
     }
-    std::cout << "the list for the rig: " << list.string() << '\n';
-    return 0;
+    say(options, "the list for the rig: " + list.string());
+    return say_all(options, all);
 }
 
 }  // namespace
@@ -171,6 +201,7 @@ void add_pki(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(1, 3650))
         ->capture_default_str();
     making.add_option("--p12-password", options.password, "Of the files for browsers");
+    making.add_flag("--json", options.json, "Print what was made as JSON");
     making.footer(
         "Example: vibrig pki init --host rig.lab --host 10.0.0.5 --operator ada --viewer wall\n"
         "Again, with other names, it adds them. On the rig:\n"
@@ -184,6 +215,7 @@ void add_pki(CLI::App& app, int& exit_code) {
         "vibrig: ");
     revoking.add_option("--folder", of.folder, "Where they are")->capture_default_str();
     revoking.add_option("name", of.revoked, "Whose")->required();
+    revoking.add_flag("--json", of.json, "Print what was done as JSON");
     revoking.footer(
         "Example: vibrig pki revoke ada\n"
         "On the rig, which takes a changed list over by itself and ends connections:\n"

@@ -9,6 +9,7 @@
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/remote.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -45,7 +46,8 @@ int check_at_rest(const serve::Address& at, const std::string& by, bool json) {
     command.set_argument("attended rest");
     if (const auto why = refusal_of(client, command); !why.empty()) {
         if (json)
-            std::cout << nlohmann::ordered_json{{"outcome", "refused"}, {"message", why}}.dump(1)
+            std::cout << proto::json_text(
+                             nlohmann::ordered_json{{"outcome", "refused"}, {"message", why}}, 1)
                       << '\n';
         std::cerr << "vibrig: " << why << '\n';
         return kNo;
@@ -70,7 +72,7 @@ int check_at_rest(const serve::Address& at, const std::string& by, bool json) {
             {"by", check.by()},           {"utc_ns", check.utc_ns()},
             {"message", check.message()}, {"suspects", nlohmann::ordered_json::array()}};
         for (const auto& suspect : check.suspects()) found["suspects"].push_back(suspect);
-        std::cout << found.dump(1) << '\n';
+        std::cout << proto::json_text(found, 1) << '\n';
     }
     return check.verdict() == "right" ? 0 : kNo;
 }

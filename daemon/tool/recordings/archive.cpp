@@ -11,6 +11,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/identification.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -39,11 +40,14 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
     constexpr std::array<const char*, 3> kDone{"copied", "was there", "mended"};
     const char* const done = kDone[static_cast<std::size_t>(delivery.kind)];
     if (json) {
-        std::cout << Json{{"folder", folder},          {"done", done},
-                          {"campaign", entry.key},     {"hash", entry.hash},
-                          {"unit", entry.unit_serial}, {"verdict", entry.verdict},
-                          {"earlier", history},        {"moved", moved_json(moved)}}
-                         .dump(-1, ' ', false, Json::error_handler_t::replace)
+        std::cout << proto::json_text(Json{{"folder", folder},
+                                           {"done", done},
+                                           {"campaign", entry.key},
+                                           {"hash", entry.hash},
+                                           {"unit", entry.unit_serial},
+                                           {"verdict", entry.verdict},
+                                           {"earlier", history},
+                                           {"moved", moved_json(moved)}})
                   << '\n';
     } else {
         std::cout << folder << ": " << done << ", " << entry.key << '\n';
@@ -125,11 +129,10 @@ int verify_archive(const VerifyOptions& o) {
         for (const auto& one : found.findings)
             findings.push_back(
                 {{"what", one.what}, {"campaign", one.campaign}, {"text", one.text}});
-        std::cout << Json{{"campaigns", found.campaigns},
-                          {"files", found.files},
-                          {"bytes", found.bytes},
-                          {"findings", std::move(findings)}}
-                         .dump(-1, ' ', false, Json::error_handler_t::replace)
+        std::cout << proto::json_text(Json{{"campaigns", found.campaigns},
+                                           {"files", found.files},
+                                           {"bytes", found.bytes},
+                                           {"findings", std::move(findings)}})
                   << '\n';
     } else {
         for (const auto& one : found.findings) std::cout << one.what << ": " << one.text << '\n';

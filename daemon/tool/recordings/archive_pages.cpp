@@ -15,6 +15,7 @@
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
 #include "estimator/identification/identification.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -260,7 +261,7 @@ serve::Document ArchivePages::answer(std::string_view path, std::string_view que
         const auto trend = archive::trend_of(std::move(campaigns), archive::kShutdownAfterH);
         if (path == "/chart") return chart(trend, serve::query_value(query, "coefficient"));
         return {200, "application/json",
-                trend_json(*serial, trend, archive::kShutdownAfterH).dump()};
+                proto::json_text(trend_json(*serial, trend, archive::kShutdownAfterH))};
     }
     return {404, "", "no such page"};
 }

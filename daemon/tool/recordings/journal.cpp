@@ -10,6 +10,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -73,7 +74,7 @@ void print_json(const std::string& file, const journal::Verdict& verdict) {
                                       {"fingerprint", journal::fingerprint(verdict.public_key)},
                                       {"newer_than_head", verdict.unpublished},
                                       {"found", verdict.found}};
-    std::cout << root.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+    std::cout << proto::json_text(root, 2) << '\n';
 }
 
 void print_words(const std::string& file, const journal::Verdict& verdict, bool anchored) {

@@ -8,6 +8,7 @@
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -86,7 +87,7 @@ int list(const ListOptions& o) {
         std::string text = "{\"campaigns\":[";
         for (const auto& one : found) {
             if (&one != &found.front()) text += ',';
-            text += entry_json(one).dump(-1, ' ', false, Json::error_handler_t::replace);
+            text += proto::json_text(entry_json(one));
         }
         std::cout << text << "]}\n";
     } else {

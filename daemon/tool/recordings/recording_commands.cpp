@@ -19,6 +19,7 @@
 #include "daemon/tool/recordings/export_csv.hpp"
 #include "daemon/tool/recordings/mat_file.hpp"
 #include "estimator/filter/angles.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -147,11 +148,14 @@ bool export_candump(const record::Campaign& campaign, const std::string& path, b
 
 struct ExportOptions {
     std::string campaign, format, output;
+    bool json = false;
 };
 
 int export_campaign(const ExportOptions& options) {
     const std::string &argument = options.campaign, &format = options.format;
     std::string path = options.output;
+    if (options.json && path == "-")
+        throw std::runtime_error("--json: found it beside --output -, expected a file to write");
     record::Campaign campaign;
     {
         Progress progress("reading " + argument);
@@ -165,14 +169,22 @@ int export_campaign(const ExportOptions& options) {
         std::ranges::replace(path, '/', '_');
     }
     keep_recordings(path);
+    bool whole = true;
     if (format == "csv") {
         export_csv(campaign, path);
     } else if (format == "mat") {
         export_mat(campaign, path);
-    } else if (!export_candump(campaign, path, format == "wireshark")) {
-        return kNo;
+    } else {
+        whole = export_candump(campaign, path, format == "wireshark");
     }
-    return 0;
+    if (options.json) {
+        std::cout << proto::json_text(nlohmann::ordered_json{{"campaign", campaign.head.name},
+                                                             {"format", format},
+                                                             {"file", path},
+                                                             {"whole", whole}})
+                  << std::endl;
+    }
+    return whole ? 0 : kNo;
 }
 
 std::vector<std::string> lost(const record::Recovery& found) {
@@ -240,7 +252,7 @@ int recover(const RecoverOptions& options) {
     for (const auto& campaign : found) {
         if (!campaign.missing_raw.empty() || !campaign.failed.empty()) code = kNo;
         if (options.json) {
-            std::cout << recovery_json(campaign).dump() << '\n';
+            std::cout << proto::json_text(recovery_json(campaign)) << '\n';
         } else if (campaign.failed.empty()) {
             if (found.size() > 1) std::cout << campaign.path << ": ";
             std::cout << recovery_text(campaign);
@@ -269,6 +281,7 @@ void add_recordings(CLI::App& app, int& exit_code) {
     exporting.add_option("-o,--output", options.output,
                          "file to write (default: the campaign's name here; candump: - is "
                          "standard output)");
+    exporting.add_flag("--json", options.json, "print what was written as JSON");
     exporting.footer(
         "Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv\n"
         "A sample takes 79 bytes in the recording's HDF5 file (93 with estimates and covariances), "

@@ -11,6 +11,7 @@
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
 #include "estimator/identification/identification.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -49,7 +50,7 @@ int trend(const TrendOptions& o) {
     if (campaigns.empty()) unknown_unit(*index, o.serial);
     const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h);
     if (o.json) {
-        std::cout << trend_json(o.serial, found, o.shutdown_after_h).dump() << '\n';
+        std::cout << proto::json_text(trend_json(o.serial, found, o.shutdown_after_h)) << '\n';
     } else {
         std::cout << trend_table(o.serial, found, o.shutdown_after_h);
     }

@@ -1,6 +1,9 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 #include "tests/unit/support/vibrig_command.hpp"
 
@@ -34,6 +37,48 @@ TEST_F(VibrigOptions, AnEmptyValueIsNoDefault) {
     EXPECT_NE(error.find("--config: found nothing"), std::string::npos) << error;
     EXPECT_EQ(run(VIBRIG_PLANT, "record -o x.csv --truth ''"), 2);
     EXPECT_NE(error.find("--truth: found nothing"), std::string::npos) << error;
+}
+
+TEST_F(VibrigOptions, EachProgramSaysItsNameAndVersion) {
+    for (const auto& [program, name] :
+         {std::pair{VIBRIG, "vibrig"}, {VIBRIGD, "vibrigd"}, {VIBRIG_PLANT, "vibrig-plant"}}) {
+        EXPECT_EQ(run(program, "--version"), 0) << error;
+        EXPECT_THAT(out, testing::MatchesRegex(std::string(name) + " [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+    }
+}
+
+TEST_F(VibrigOptions, PkiSaysToMachinesWhatItMade) {
+    // GIVEN an authority with a server and two people
+    ASSERT_EQ(vibrig("pki init --json --folder p --host a.lab --viewer wall --operator ada"), 0);
+    const auto made = nlohmann::json::parse(out);
+    EXPECT_EQ(made["authority_is_new"], true);
+    EXPECT_EQ(made["server"]["hosts"], nlohmann::json{"a.lab"});
+    ASSERT_EQ(made["people"].size(), 2);
+    EXPECT_EQ(made["people"][1]["name"], "ada");
+    EXPECT_EQ(made["people"][1]["role"], "operator");
+    // THEN each file that is named is there
+    for (const auto& file : {made["authority"], made["server"]["key"], made["people"][0]["key"],
+                             made["people"][0]["certificate"], made["people"][1]["browser"]})
+        EXPECT_NE(content(file), "") << file;
+    // AND of a second call only what is new
+    ASSERT_EQ(vibrig("pki init --json --folder p --admin eve"), 0);
+    const auto more = nlohmann::json::parse(out);
+    EXPECT_EQ(more["authority_is_new"], false);
+    EXPECT_TRUE(more["server"].is_null());
+    EXPECT_EQ(more["people"].size(), 1);
+    // AND of a revocation the list, and who is on it
+    ASSERT_EQ(vibrig("pki revoke --json --folder p eve wall"), 0);
+    const auto revoked = nlohmann::json::parse(out);
+    EXPECT_EQ(revoked["revoked"], (nlohmann::json{"eve", "wall"}));
+    EXPECT_THAT(content(revoked["list"]), testing::HasSubstr("X509 CRL"));
+}
+
+TEST_F(VibrigOptions, JsonHasATextThatIsNoUtf8) {
+    // GIVEN a folder whose name is Latin-1
+    ASSERT_EQ(vibrig("pki init --json --folder 'caf\351'"), 0) << error;
+    // THEN it is made, and a mark stands for what JSON cannot have
+    EXPECT_NE(content("caf\351/authority.crt"), "");
+    EXPECT_EQ(nlohmann::json::parse(out)["folder"], "caf\uFFFD");
 }
 
 }  // namespace
