@@ -147,6 +147,11 @@ void CampaignDwells::resume(const std::string& by) {
     keep(std::move(result));
 }
 
+estimator::spectrum::Shaken CampaignDwells::shaken() const {
+    const auto& spectrum = with_.book.spectrum();
+    return {configuration::numbered_kinds(configuration_), spectrum.sweeps, spectrum.psds};
+}
+
 void CampaignDwells::end(bool complete) {
     to_write_ = complete ? ToWrite::complete : ToWrite::partial;
     with_.book.noise().report();
@@ -229,11 +234,10 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
     if (written() || !with_.book.free()) return;
     assessing_.abandon();
     keep_revised(campaign);
-    write_result(judge(configuration_.estimator, whole_result(), again(),
-                       estimator::uncertainty::Stage::ended, with_.book.identification().rows(),
-                       configuration::numbered_kinds(configuration_), with_.book.spectrum().sweeps,
-                       with_.book.spectrum().psds),
-                 campaign);
+    write_result(
+        judge(configuration_.estimator, whole_result(), again(),
+              estimator::uncertainty::Stage::ended, with_.book.identification().rows(), shaken()),
+        campaign);
 }
 
 /// What marks the campaign, that its result is against the certificate included.

@@ -17,6 +17,7 @@
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/stirred_waiter.hpp"
 #include "estimator/identification/result.hpp"
+#include "estimator/spectrum/shaken.hpp"
 
 namespace vibrig::estimator::uncertainty {
 struct Assessment;
@@ -103,6 +104,7 @@ class CampaignDwells final : public campaign::Dwells {
     void take_type_prior();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;
+    [[nodiscard]] estimator::spectrum::Shaken shaken() const;
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
     void take_verdict(campaign::Campaign& campaign);
     void tell_verdict(const estimator::uncertainty::Assessment& assessed,

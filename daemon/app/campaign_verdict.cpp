@@ -93,20 +93,17 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     if (!with_.book.free()) return;
     std::shared_ptr<const Judged> judged;
     if (verdict_wanted()) {
-        const auto& spectrum = with_.book.spectrum();
         // In a thread of its own also where one may wait: what it has of memory, more with each
         // dwell, is in nobody's way.
         const auto work = [settings = configuration_.estimator, result = whole_result(),
                            rows = with_.book.identification().rows(),
-                           profiles = configuration::numbered_kinds(configuration_),
-                           sweeps = concluding_ ? spectrum.sweeps : decltype(spectrum.sweeps){},
-                           psds = concluding_ ? spectrum.psds : decltype(spectrum.psds){},
+                           shaken = concluding_ ? this->shaken() : estimator::spectrum::Shaken{},
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
                            trim = !with_.memory_locked] {
-            auto found = std::make_shared<const Judged>(
-                judge(settings, result, anew, stage, rows, profiles, sweeps, psds));
+            auto found =
+                std::make_shared<const Judged>(judge(settings, result, anew, stage, rows, shaken));
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;

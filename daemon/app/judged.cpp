@@ -13,56 +13,55 @@ namespace uncertainty = estimator::uncertainty;
 
 namespace {
 
-/// Without what other frequencies say. Returns all rows of what was identified anew; none: nothing
-/// was.
-std::vector<estimator::DwellRow> assess(Judged& out, const estimator::Settings& settings,
-                                        const estimator::Result& result,
-                                        const std::optional<Again>& again,
-                                        uncertainty::Stage stage) {
-    if (again && !result.dwells.empty()) {
-        dwells::Anew anew(settings, again->found, result.dwells.size());
-        auto& identification = anew.identification();
-        out.not_anew =
-            again->journal.empty()
-                ? "no journal is kept"
-                : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
-                                  [&](const journal::DwellCheckpoint& dwell) {
-                                      const auto& all = dwell.measurements;
-                                      dwells::feed(
-                                          identification, dwell.info, all.size(),
-                                          [&all](std::size_t n) { return all[n]; }, false,
-                                          [](std::size_t, const estimator::StepResult&) {});
-                                  });
-        auto found = anew.result();
-        if (out.not_anew.empty() && found.dwells.size() != result.dwells.size())
-            out.not_anew = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
-                                       result.dwells.size(), again->journal);
-        if (out.not_anew.empty()) {
-            out.live = std::make_shared<const dwells::Live>(
-                dwells::Live{again->found, result, uncertainty::assess(settings, result)});
-            out.assessed = dwells::assess(settings, again->found, found);
-            out.anew = std::move(found);
-            return identification.rows();
-        }
-    }
-    out.assessed = uncertainty::assess(settings, result, stage);
-    return {};
+struct TakenAnew {
+    estimator::Result result;
+    std::vector<estimator::DwellRow> rows;  ///< of all dwells
+};
+
+/// From the journal, with the noise that was found; nothing: `why_not` says why.
+std::optional<TakenAnew> take_anew(const estimator::Settings& settings, const Again& again,
+                                   const estimator::Result& result, std::string& why_not) {
+    dwells::Anew anew(settings, again.found, result.dwells.size());
+    auto& identification = anew.identification();
+    why_not = again.journal.empty()
+                  ? "no journal is kept"
+                  : journal::reread(again.journal, again.configuration_hash, result.dwells.back(),
+                                    [&](const journal::DwellCheckpoint& dwell) {
+                                        const auto& all = dwell.measurements;
+                                        dwells::feed(
+                                            identification, dwell.info, all.size(),
+                                            [&all](std::size_t n) { return all[n]; }, false,
+                                            [](std::size_t, const estimator::StepResult&) {});
+                                    });
+    auto found = anew.result();
+    if (why_not.empty() && found.dwells.size() != result.dwells.size())
+        why_not = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
+                              result.dwells.size(), again.journal);
+    if (!why_not.empty()) return {};
+    return TakenAnew{std::move(found), identification.rows()};
 }
 
 }  // namespace
 
 Judged judge(const estimator::Settings& settings, const estimator::Result& result,
              const std::optional<Again>& again, uncertainty::Stage stage,
-             const std::vector<estimator::DwellRow>& all_rows, const tool::NumberedKinds& profiles,
-             std::vector<estimator::spectrum::Sweep> sweeps, const tool::PlayedBands& psds) {
+             const std::vector<estimator::DwellRow>& all_rows, estimator::spectrum::Shaken shaken) {
     Judged out;
-    const auto anew = assess(out, settings, result, again, stage);
-    if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
-    const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
-    out.spectrum =
-        tool::spectrum_of(in_force, out.anew ? anew : all_rows,
-                          estimator::spectrum::Form::automatic, profiles, std::move(sweeps), psds);
-    if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
+    if (stage != uncertainty::Stage::ended) {
+        out.assessed = uncertainty::assess(settings, result, stage);
+        return out;
+    }
+    std::optional<TakenAnew> anew;
+    if (again && !result.dwells.empty()) anew = take_anew(settings, *again, result, out.not_anew);
+    auto found =
+        anew ? tool::assess(settings, again->found, anew->result, anew->rows, std::move(shaken))
+             : tool::assess(settings, {}, result, all_rows, std::move(shaken));
+    out.assessed = std::move(found.assessed);
+    out.spectrum = std::move(found.spectrum);
+    if (!anew) return out;
+    out.live = std::make_shared<const dwells::Live>(
+        dwells::Live{again->found, result, uncertainty::assess(settings, result)});
+    out.anew = std::move(anew->result);
     return out;
 }
 

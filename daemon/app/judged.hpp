@@ -34,9 +34,7 @@ struct Judged {
 [[nodiscard]] Judged judge(const estimator::Settings& settings, const estimator::Result& result,
                            const std::optional<Again>& again, estimator::uncertainty::Stage stage,
                            const std::vector<estimator::DwellRow>& all_rows,
-                           const tool::NumberedKinds& profiles,
-                           std::vector<estimator::spectrum::Sweep> sweeps,
-                           const tool::PlayedBands& psds);
+                           estimator::spectrum::Shaken shaken);
 
 [[nodiscard]] Severity severity_of(estimator::uncertainty::Level level);
 

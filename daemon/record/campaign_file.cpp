@@ -248,6 +248,10 @@ void place_played(Campaign& campaign) {
         order.played->random.level_db = order.random.level_db;
         order.psd = found->psd;
     }
+    std::uint32_t place = 0;
+    for (Order& order : campaign.orders)
+        if (order.played && order.played->word == estimator::PlayedRandom::Word::good)
+            order.played->place = ++place;
 }
 
 bool is_hdf5(const std::string& path) {

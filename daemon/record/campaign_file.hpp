@@ -44,7 +44,7 @@ struct Campaign {
     std::vector<Gap> gaps;
 };
 
-/// Into the orders what was played in them.
+/// Into the orders what was played in them, PSDs that were reported numbered from 1.
 void place_played(Campaign& campaign);
 
 /// A dwell that was not cancelled before it began, with its samples.

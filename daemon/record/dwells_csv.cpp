@@ -301,6 +301,7 @@ void read_dwells(const std::string& path, Campaign& to) {
         for (Time* time : {&order.announced, &order.from, &order.to})
             if (*time != 0) to_clock(*time);
     }
+    place_played(to);
 }
 
 }  // namespace vibrig::record

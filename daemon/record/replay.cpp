@@ -111,13 +111,6 @@ estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
     return sweep;
 }
 
-void number_psds(Campaign& campaign) {
-    std::uint32_t place = 0;
-    for (Order& order : campaign.orders)
-        if (order.played && order.played->word == estimator::PlayedRandom::Word::good)
-            order.played->place = ++place;
-}
-
 bool noise_known(const Campaign& campaign) {
     return std::ranges::all_of(campaign.orders, [](const Order& order) {
         return order.cancel || order.noise.angle_arcsec > 0;
@@ -229,11 +222,13 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     play_until(samples.size());
     take();
     out.result = player.book().identification().result();
+    out.rows = player.book().identification().rows();
     qualify(campaign, out.dwells.size(), out.result);
     out.found = decide ? player.book().noise().found() : campaign.found;
     if (out.found) {
         const dwells::Anew again = anew(campaign, settings, *out.found);
         out.live = std::exchange(out.result, again.result());
+        out.rows = again.identification().rows();
         take_estimate(again.identification(), out.anew.emplace());
         qualify(campaign, out.dwells.size(), out.result);
     }

@@ -19,7 +19,8 @@ struct ReplayOptions {
 
 struct ReplayResult {
     estimator::Result result;
-    std::vector<Dwell> dwells;  ///< as they were shown live
+    std::vector<estimator::DwellRow> rows;  ///< of all dwells, those apart from the result's too
+    std::vector<Dwell> dwells;              ///< as they were shown live
     /// Where the result was identified anew: what it replaces, and the coefficients as a dwell has
     /// them.
     std::optional<noise::Found> found;
@@ -43,9 +44,6 @@ using OnStep = std::function<void(std::size_t sample, const estimator::StepResul
 [[nodiscard]] estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
                                                       const estimator::Settings& settings,
                                                       const RecordedDwell& dwell);
-
-/// Numbers the PSDs that its random dwells were taken with, from 1: PlayedRandom::place.
-void number_psds(Campaign& campaign);
 
 /// One dwell into a filter, with the zeros of the recording and the noise levels of its result.
 void feed(estimator::Identification& identification, const Campaign& campaign,

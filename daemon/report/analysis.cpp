@@ -7,7 +7,9 @@
 #include <set>
 #include <utility>
 
-#include "daemon/configuration/configuration.hpp"
+#include "daemon/record/shaken.hpp"
+#include "daemon/report/paperwork.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/dwell_residual.hpp"
@@ -93,6 +95,12 @@ Line fit(const std::vector<estimator::AngleBlock>& blocks, const std::vector<dou
     return {ty / tt, noise / std::sqrt(tt)};
 }
 
+/// The coefficients at the reference frequency do not rest on it.
+bool apart(const estimator::Settings& settings, const record::Order& order) {
+    return order.held_out || order.random.mean_square_g2 > 0 || order.sweep.any() ||
+           (order.frequency_hz > 0 && !estimator::at_reference(settings, order.frequency_hz));
+}
+
 /// Coefficients from all positions but those of one fold.
 Coefficients without(const Campaign& campaign, const estimator::Settings& settings,
                      const std::vector<RecordedDwell>& dwells, const std::set<int>& left_out) {
@@ -119,11 +127,7 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
     for (std::size_t d = 0; d < dwells.size() && d < replayed.dwells.size(); ++d) {
         const RecordedDwell& dwell = dwells[d];
         // What is apart is nothing that these coefficients foretell.
-        const double hz = dwell.order->frequency_hz;
-        if (dwell.order->held_out || dwell.order->random.mean_square_g2 > 0 ||
-            (hz > 0 && !estimator::at_reference(settings, hz)))
-            continue;
-        if (!left_out.contains(dwell.order->position)) continue;
+        if (apart(settings, *dwell.order) || !left_out.contains(dwell.order->position)) continue;
         const auto blocks = blocks_of(campaign, dwell);
         if (blocks.size() < 10) continue;
         HeldOut out;
@@ -249,18 +253,41 @@ void allan_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells
     }
 }
 
+/// What the plan, as it was run, lets expect of the coefficients at the reference frequency.
+void expect(const Campaign& campaign, const std::vector<RecordedDwell>& dwells, Analysis& out) {
+    const estimator::Settings& settings = out.settings;
+    std::vector<estimator::PlannedDwell> plan;
+    for (std::size_t d = 0; d < dwells.size() && d < out.replayed.dwells.size(); ++d) {
+        if (dwells[d].count == 0 || apart(settings, *dwells[d].order)) continue;
+        estimator::PlannedDwell planned;
+        const auto& angle = campaign.samples[dwells[d].first].angle;
+        for (std::size_t k = 0; k < 3; ++k)
+            planned.angles_deg[k] = settings.encoder_sign[k] * (angle[k] * estimator::kDegPerRad -
+                                                                settings.encoder_zero_deg[k]);
+        planned.kappa = out.replayed.dwells[d].summary.kappa;
+        planned.duration_s = drivers::to_seconds(dwells[d].order->to - dwells[d].order->from);
+        plan.push_back(planned);
+    }
+    out.expected_sigma.fill(std::numeric_limits<double>::infinity());
+    // Of readings closer together than any rig's (10 kHz) it would be a sum of billions.
+    constexpr double kShortest_s = 1e-5;
+    if (const double period_s = period_of(campaign, dwells);
+        !plan.empty() && period_s > kShortest_s) {
+        out.expected_sigma =
+            estimator::predicted_sigma(settings, plan, out.coefficients.value, period_s);
+    }
+}
+
 }  // namespace
 
 double origin_s(const Campaign& campaign) {
     return campaign.samples.empty() ? 0 : drivers::to_seconds(campaign.samples.front().time);
 }
 
-estimator::Settings settings_of(const Campaign& campaign) {
-    return dwells::Anew::settings_of(
-        configuration::parse(record::identification_sections(campaign.head.configuration),
-                             "configuration in " + campaign.path, false)
-            .configuration.estimator,
-        campaign.found);
+configuration::Configuration rig_of(const Campaign& campaign) {
+    auto rig = configuration_of(campaign);
+    rig.estimator = dwells::Anew::settings_of(rig.estimator, campaign.found);
+    return rig;
 }
 
 Coefficients final_coefficients(const std::string& path, const record::ReplayResult& replayed) {
@@ -277,21 +304,25 @@ Coefficients final_coefficients(const std::string& path, const std::vector<recor
 
 Coefficients recorded_coefficients(const Campaign& campaign) {
     if (!campaign.found) return final_coefficients(campaign.path, campaign.dwells);
-    const auto anew = record::anew(campaign, settings_of(campaign), *campaign.found);
+    const auto anew = record::anew(campaign, rig_of(campaign).estimator, *campaign.found);
     estimator::Estimate estimate;
     anew.identification().solved(estimate);
     return {estimate.value, estimate.sigma, estimate.observable,
             anew.identification().covariance()};
 }
 
-Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
+Analysis analyse(const Campaign& campaign, const configuration::Configuration& rig,
                  const Progress& progress) {
+    const estimator::Settings& settings = rig.estimator;
     Analysis out;
     out.settings = settings;
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
     out.coefficients = final_coefficients(campaign.path, out.replayed);
-    out.assessed = dwells::assess(settings, out.replayed.found, out.replayed.result);
+    auto whole = tool::assess(settings, out.replayed.found, out.replayed.result, out.replayed.rows,
+                              record::shaken_of(campaign, rig));
+    out.assessed = std::move(whole.assessed);
+    if (whole.spectrum) out.reference_hz = whole.spectrum->reference_hz;
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;
@@ -320,26 +351,7 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
     out.innovations = innovations_of(campaign, settings, dwells);
     progress(0.9);
     allan_of(campaign, dwells, out);
-    std::vector<estimator::PlannedDwell> plan;
-    for (std::size_t d = 0; d < dwells.size() && d < out.replayed.dwells.size(); ++d) {
-        if (dwells[d].count == 0) continue;
-        estimator::PlannedDwell planned;
-        const auto& angle = campaign.samples[dwells[d].first].angle;
-        for (std::size_t k = 0; k < 3; ++k)
-            planned.angles_deg[k] = settings.encoder_sign[k] * (angle[k] * estimator::kDegPerRad -
-                                                                settings.encoder_zero_deg[k]);
-        planned.kappa = out.replayed.dwells[d].summary.kappa;
-        planned.duration_s = drivers::to_seconds(dwells[d].order->to - dwells[d].order->from);
-        plan.push_back(planned);
-    }
-    out.expected_sigma.fill(std::numeric_limits<double>::infinity());
-    // Of readings closer together than any rig's (10 kHz) it would be a sum of billions.
-    constexpr double kShortest_s = 1e-5;
-    if (const double period_s = period_of(campaign, dwells);
-        !plan.empty() && period_s > kShortest_s) {
-        out.expected_sigma =
-            estimator::predicted_sigma(settings, plan, out.coefficients.value, period_s);
-    }
+    expect(campaign, dwells, out);
     progress(1);
     return out;
 }

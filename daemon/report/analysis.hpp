@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/report/compensation.hpp"
@@ -38,8 +39,9 @@ struct Innovations {
 
 struct Analysis {
     record::ReplayResult replayed;
-    Coefficients coefficients;  ///< of a constant bias, sigma of noise alone
-    estimator::uncertainty::Assessment assessed;
+    Coefficients coefficients;                    ///< of a constant bias, sigma of noise alone
+    estimator::uncertainty::Assessment assessed;  ///< over frequency, where there are several
+    double reference_hz = 0;  ///< of `coefficients` where there are several; 0: there is one
     estimator::Settings settings;
     Innovations innovations;
     std::vector<HeldOut> held_out;
@@ -57,13 +59,14 @@ using Progress = std::function<void(double fraction)>;
 /// Replays the campaign, and identifies it several times more without some of its positions.
 /// Throws.
 [[nodiscard]] Analysis analyse(const record::Campaign& campaign,
-                               const estimator::Settings& settings, const Progress& progress);
+                               const configuration::Configuration& rig, const Progress& progress);
 
 /// Of its first sample, on the daemon's clock; 0: there is none.
 [[nodiscard]] double origin_s(const record::Campaign& campaign);
 /// The same of a recording that is not replayed.
 [[nodiscard]] Coefficients recorded_coefficients(const record::Campaign& campaign);
-[[nodiscard]] estimator::Settings settings_of(const record::Campaign& campaign);
+/// As it lies in the recording, its noise that which was found.
+[[nodiscard]] configuration::Configuration rig_of(const record::Campaign& campaign);
 /// Coefficients of a campaign's result.
 [[nodiscard]] Coefficients final_coefficients(const std::string& path,
                                               const record::ReplayResult& replayed);

@@ -231,13 +231,8 @@ void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
 
 void add_spectrum(const SpectrumResult& of, Json& root) {
     const Analysis& a = of.analysis;
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        const std::size_t group = estimator::internal_of(i) / estimator::kGyros;
-        const bool still = a.gyros[estimator::internal_of(i) % estimator::kGyros].resonant();
-        // Bias and linear terms know no frequency.
-        root["parameters"][i]["at_hz"] =
-            group < estimator::kDii || still ? Json(0.0) : number_or_null(of.reference_hz);
-    }
+    for (std::size_t i = 0; i < kParameters; ++i)
+        root["parameters"][i]["at_hz"] = number_or_null(of.at_hz(i));
     if (of.several()) {
         for (std::size_t k = 0; k < of.table.list().size(); ++k) {
             const SpectralDwell& dwell = of.table.list()[k];

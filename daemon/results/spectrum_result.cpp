@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
+#include "estimator/uncertainty/coverage.hpp"
 
 namespace vibrig::tool {
 
@@ -50,8 +52,17 @@ std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
     return list;
 }
 
-void tell_coefficients(const Analysis& of, uncertainty::Assessment& to) {
-    using uncertainty::Contribution;
+/// Coefficients of gyro j by what is in force.
+Index fitted(const SpectrumResult& of, std::size_t j) {
+    return of.analysis.form == Form::groups ? of.table.grouped(j).cols()
+                                            : of.analysis.gyros[j].list.front().x.size();
+}
+
+void tell_coefficients(const SpectrumResult& spectrum, const uncertainty::Inputs& inputs,
+                       uncertainty::Assessment& to) {
+    const Analysis& of = spectrum.analysis;
+    const Eigen::MatrixXd combined =
+        of.covariance + uncertainty::unseen_covariance(inputs, of.value, to.sync_bound);
     for (std::size_t i = 0; i < kParameters; ++i) {
         uncertainty::Coefficient& c = to.coefficients[i];
         if (!std::isfinite(c.value)) continue;
@@ -59,9 +70,8 @@ void tell_coefficients(const Analysis& of, uncertainty::Assessment& to) {
         const auto a = static_cast<Index>(internal);
         c.value = of.value[a];
         c.u_a = std::sqrt(of.covariance_a(a, a));
-        c.u = std::sqrt(of.covariance(a, a));
+        c.u = std::sqrt(combined(a, a));
         c.u_b = std::sqrt(std::max(0.0, c.u * c.u - c.u_a * c.u_a));
-        c.expanded = c.k * c.u;
         c.budget.clear();
         const auto infinite = std::numeric_limits<double>::infinity();
         c.budget.push_back({"noise and drift states", "", 1, c.u_a, c.u_a,
@@ -74,14 +84,15 @@ void tell_coefficients(const Analysis& of, uncertainty::Assessment& to) {
             c.budget.push_back({effect.input, effect.element, sensitivity, d.u, std::abs(change),
                                 d.shape, d.dof, d.declared});
         }
-        std::stable_sort(c.budget.begin(), c.budget.end(), [](const auto& x, const auto& y) {
-            return x.contribution > y.contribution;
-        });
+        uncertainty::add_unseen(inputs, of.value, to.sync_bound, internal, c.budget);
+        const std::size_t j = internal % estimator::kGyros;
+        uncertainty::expand(inputs, internal,
+                            static_cast<double>(spectrum.table.dwells() - fitted(spectrum, j)),
+                            to.ramps.mean[j], c);
         for (std::size_t k = 0; k < kParameters; ++k) {
             const auto b = static_cast<Index>(estimator::internal_of(k));
             if (!std::isfinite(to.coefficients[k].u)) continue;
-            to.covariance_combined(static_cast<Index>(i), static_cast<Index>(k)) =
-                of.covariance(a, b);
+            to.covariance_combined(static_cast<Index>(i), static_cast<Index>(k)) = combined(a, b);
         }
     }
 }
@@ -96,11 +107,11 @@ void doubt(uncertainty::Verdict& verdict, const std::string& text) {
 
 /// With what a row shook; nothing: it is not known. No bands: at rest.
 std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator::DwellRow& row,
-                            const NumberedKinds& profiles) {
+                            const Shaken& shaken) {
     if (row.random) {
-        const auto profile =
-            std::ranges::find(profiles, row.profile, &NumberedKinds::value_type::first);
-        return profile == profiles.end() ? std::nullopt : std::optional(profile->second);
+        const auto profile = std::ranges::find(shaken.profiles, row.profile,
+                                               [](const auto& one) { return one.first; });
+        return profile == shaken.profiles.end() ? std::nullopt : std::optional(profile->second);
     }
     if (!(row.vibration.kappa > 1)) return Kind{};
     const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
@@ -108,6 +119,13 @@ std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator
 }
 
 }  // namespace
+
+double SpectrumResult::at_hz(std::size_t parameter) const {
+    const std::size_t internal = estimator::internal_of(parameter);
+    // Bias and linear terms know no frequency.
+    const bool linear = internal / estimator::kGyros < estimator::kDii;
+    return linear || analysis.gyros[internal % estimator::kGyros].resonant() ? 0 : reference_hz;
+}
 
 Form form_of(const std::string& name) {
     for (const Form form : {Form::automatic, Form::flat, Form::groups, Form::resonance}) {
@@ -125,14 +143,14 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
 }
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
-                                          const std::vector<estimator::DwellRow>& rows, Form form,
-                                          const NumberedKinds& profiles, std::vector<Sweep> sweeps,
-                                          const PlayedBands& psds) {
+                                          const std::vector<estimator::DwellRow>& rows,
+                                          Shaken shaken, Form form) {
+    const auto& psds = shaken.psds;
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
     std::vector<SpectrumResult::HeldOut> held_out;
     for (const estimator::DwellRow& row : rows) {
-        std::optional<Kind> kind = kind_of(settings, row, profiles);
+        std::optional<Kind> kind = kind_of(settings, row, shaken);
         if (!kind) continue;
         const bool own = row.psd > 0 && row.psd <= psds.size();
         if (row.held_out) {
@@ -149,25 +167,36 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
         dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
         if (known == kinds.end()) kinds.push_back(std::move(*kind));
     }
-    std::erase_if(sweeps, [](const Sweep& sweep) { return sweep.known() == 0; });
-    const bool several = kinds.size() >= 2 || (kinds.size() == 1 && !sweeps.empty());
+    std::erase_if(shaken.sweeps, [](const Sweep& sweep) { return sweep.known() == 0; });
+    const bool several = kinds.size() >= 2 || (kinds.size() == 1 && !shaken.sweeps.empty());
     if (!several || dwells.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
     SpectrumResult found =
-        spectrum_of(settings, std::move(dwells), std::move(kinds), form, std::move(sweeps));
+        spectrum_of(settings, std::move(dwells), std::move(kinds), form, std::move(shaken.sweeps));
     found.held_out = std::move(held_out);
     return found;
 }
 
-void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
+void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
            uncertainty::Assessment& assessed) {
     if (!spectrum.several()) return;
     const Analysis& of = spectrum.analysis;
-    tell_coefficients(of, assessed);
+    tell_coefficients(spectrum, settings.uncertainty, assessed);
     assessed.rates = rates_of(spectrum);
     if (of.flat.alarm && of.form != Form::resonance)
         doubt(assessed.verdict, "quadratic coefficients depend on the frequency (p = " +
                                     std::to_string(of.flat.p) + " that they do not)");
     if (!of.model.refusal.empty()) doubt(assessed.verdict, of.model.refusal);
+}
+
+Assessed assess(const estimator::Settings& settings, const std::optional<noise::Found>& found,
+                const estimator::Result& result, const std::vector<estimator::DwellRow>& rows,
+                Shaken shaken, Form form) {
+    Assessed out{dwells::assess(settings, found, result), {}};
+    if (!out.assessed.done) return out;
+    const auto in_force = dwells::Anew::settings_of(settings, found);
+    out.spectrum = spectrum_of(in_force, rows, std::move(shaken), form);
+    if (out.spectrum) adopt(*out.spectrum, in_force, out.assessed);
+    return out;
 }
 
 }  // namespace vibrig::tool

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "daemon/dwells/anew.hpp"
 #include "estimator/spectrum/analysis.hpp"
+#include "estimator/spectrum/shaken.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::tool {
@@ -23,6 +23,9 @@ struct SpectrumResult {
     std::vector<HeldOut> held_out = {};
     std::vector<estimator::spectrum::Sweep> sweeps = {};
 
+    /// Of one of the 30, order of parameter_names(): the frequency it is of, 0: static, or it knows
+    /// none; Hz.
+    [[nodiscard]] double at_hz(std::size_t parameter) const;
     [[nodiscard]] bool several() const { return table.kinds().size() > 1 || !sweeps.empty(); }
 };
 
@@ -38,26 +41,30 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
                                          estimator::spectrum::Form form,
                                          std::vector<estimator::spectrum::Sweep> sweeps = {});
 
-/// The kinds of random vibration by their numbers in the controller.
-using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;
-
-/// Bands at the platform of the random dwells whose PSD a controller reported, by
-/// DwellRow::psd, from 1.
-using PlayedBands = std::vector<std::vector<estimator::spectrum::Band>>;
-
-/// Spectrum of a campaign's rows that say with which frequency they shook, or under which of
-/// `profiles` (others are left out), those held out left aside; nothing where there are neither
+/// Spectrum of a campaign's rows that say with which frequency they shook, or under which of its
+/// profiles (others are left out), those held out left aside; nothing where there are neither
 /// several kinds nor a sweep, or too few or too many rows. Sweeps without a known second are left
 /// out.
 [[nodiscard]] std::optional<SpectrumResult> spectrum_of(
     const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
-    estimator::spectrum::Form form = estimator::spectrum::Form::automatic,
-    const NumberedKinds& profiles = {}, std::vector<estimator::spectrum::Sweep> sweeps = {},
-    const PlayedBands& psds = {});
+    estimator::spectrum::Shaken shaken,
+    estimator::spectrum::Form form = estimator::spectrum::Form::automatic);
 
 /// With several frequencies the assessment's coefficients become those of the analysis, its rates
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.
 void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
            estimator::uncertainty::Assessment& assessed);
+
+/// What can be believed of a campaign's result, and what it is over frequency. `found`: the noise
+/// with which it was identified anew; `rows`: of all its dwells.
+struct Assessed {
+    estimator::uncertainty::Assessment assessed;
+    std::optional<SpectrumResult> spectrum;
+};
+[[nodiscard]] Assessed assess(
+    const estimator::Settings& settings, const std::optional<noise::Found>& found,
+    const estimator::Result& result, const std::vector<estimator::DwellRow>& rows,
+    estimator::spectrum::Shaken shaken,
+    estimator::spectrum::Form form = estimator::spectrum::Form::automatic);
 
 }  // namespace vibrig::tool

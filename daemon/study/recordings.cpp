@@ -13,12 +13,15 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/record/shaken.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/campaigns.hpp"
 #include "daemon/study/identified_recording.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "proto/json_number.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::study {
 
@@ -120,7 +123,7 @@ std::string identified(const Recording& recording, const std::vector<Setting>& s
                    {"samples", found.replayed.samples},
                    {"old", old_result(found.old_result)},
                    {"new", new_result(found.replayed.result, found.assessed)}};
-    return kRecording + out.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return kRecording + proto::json_text(out);
 }
 
 }  // namespace
@@ -183,9 +186,13 @@ IdentifiedRecording identify_recording(const Recording& recording,
                             campaign.result_json,
                             loaded.estimator,
                             record::replay(campaign, loaded.estimator, {}),
-                            {}};
+                            {},
+                            false};
+    auto found = tool::assess(out.settings, out.replayed.found, out.replayed.result,
+                              out.replayed.rows, record::shaken_of(campaign, loaded));
     out.settings = dwells::Anew::settings_of(out.settings, out.replayed.found);
-    out.assessed = uncertainty::assess(out.settings, out.replayed.result);
+    out.assessed = std::move(found.assessed);
+    out.over_frequency = found.spectrum.has_value();
     return out;
 }
 

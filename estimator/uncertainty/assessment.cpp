@@ -11,6 +11,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
+#include "estimator/uncertainty/coverage.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/doubtful_levels.hpp"
 #include "estimator/uncertainty/verdict.hpp"
@@ -165,7 +166,6 @@ Tested tested_with(const Settings& settings, DwellTable table, std::span<const D
 struct TypeB {
     MatrixXd sensitivity;  ///< 30 x m: G z
     MatrixXd covariance;   ///< 30 x 30
-    VectorXd local_g;      ///< per relative change of g
 };
 
 TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& rates,
@@ -173,25 +173,13 @@ TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& r
     TypeB b;
     b.sensitivity.resize(kAll, rates.cols());
     for (Index i = 0; i < rates.cols(); ++i) b.sensitivity.col(i) = all.gain * rates.col(i);
-    b.local_g = VectorXd::Zero(kAll);
-    for (std::size_t g = kDi; g < kGroups; ++g) {
-        for (std::size_t j = 0; j < kGyros; ++j) {
-            const auto i = index(internal_index(g, j));
-            b.local_g[i] = (g <= kDo ? 1.0 : 2.0) * all.value[i];
-        }
-    }
-    const double of_g = settings.uncertainty.local_g.u;
     b.covariance = b.sensitivity * u * b.sensitivity.transpose() +
-                   of_g * of_g * b.local_g * b.local_g.transpose();
-    if (settings.uncertainty.sync_motion == SyncMotionOf::platform)
-        b.covariance.diagonal().tail(kAll - index(internal_index(kDii, 0))).array() +=
-            sync_bound * sync_bound / 3;
+                   unseen_covariance(settings.uncertainty, all.value, sync_bound);
     return b;
 }
 
-std::vector<Contribution> contributions(const Settings& settings, Index i, double u_a,
-                                        const TypeB& b, const std::vector<InputSignature>& inputs,
-                                        double sync_bound) {
+std::vector<Contribution> contributions(Index i, double u_a, const TypeB& b,
+                                        const std::vector<InputSignature>& inputs) {
     std::vector<Contribution> list;
     list.push_back({"noise and drift states", "", 1, u_a, u_a, Shape::normal,
                     std::numeric_limits<double>::infinity(), true});
@@ -201,47 +189,7 @@ std::vector<Contribution> contributions(const Settings& settings, Index i, doubl
         list.push_back({inputs[p].input, inputs[p].element, c, d.u, std::abs(c) * d.u, d.shape,
                         d.dof, d.declared});
     }
-    const Declared& g = settings.uncertainty.local_g;
-    if (g.u > 0)
-        list.push_back({"local_g", "", b.local_g[i], g.u, std::abs(b.local_g[i]) * g.u, g.shape,
-                        g.dof, g.declared});
-    if (settings.uncertainty.sync_motion == SyncMotionOf::platform && i >= 12)
-        list.push_back({"sync_motion", "", 1, sync_bound / std::sqrt(3.0),
-                        sync_bound / std::sqrt(3.0), Shape::rectangular,
-                        std::numeric_limits<double>::infinity(), true});
-    std::stable_sort(list.begin(), list.end(),
-                     [](const auto& x, const auto& y) { return x.contribution > y.contribution; });
     return list;
-}
-
-void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
-    const Inputs& in = settings.uncertainty;
-    const double rho = std::min(1.0, c.sigma * c.sigma / (c.u_a * c.u_a));
-    const double spare = static_cast<double>(table.dwells() - kOfGyro);
-    double inverse = rho * rho / in.noise_dof;
-    if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
-    double sum = std::pow(c.u_a, 4) * inverse;
-    for (const Contribution& one : c.budget)
-        if (std::isfinite(one.dof)) sum += std::pow(one.contribution, 4) / one.dof;
-    c.nu_eff = sum > 0 ? std::pow(c.u, 4) / sum : std::numeric_limits<double>::infinity();
-    c.k = student_quantile(in.coverage, std::max(1.0, std::floor(c.nu_eff)));
-    c.expanded = c.k * c.u;
-}
-
-/// For another power-on; stays NaN while nobody has said how it repeats.
-void for_use(const Settings& settings, std::size_t internal, const RampFit& ramps, Coefficient& c) {
-    const Inputs& in = settings.uncertainty;
-    if (!in.turn_on_bias || !in.turn_on_linear) return;
-    const std::size_t group = internal / kGyros;
-    double square = c.u * c.u;
-    if (group == kDt) {
-        const Declared seen{std::abs(ramps.mean[internal % kGyros]) / 2 / std::sqrt(3.0)};
-        for (const Declared& one : {*in.turn_on_bias, in.ramp_in_dwell.value_or(seen)})
-            square += one.u * one.u;
-    } else if (group <= kDo) {
-        square += in.turn_on_linear->u * in.turn_on_linear->u;
-    }
-    c.u_use = std::sqrt(square);
 }
 
 double worst_step(const std::array<GyroRates, 3>& gyros) {
@@ -324,9 +272,10 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
         c.u_a = std::sqrt(all.covariance(a, a));
         c.u_b = std::sqrt(std::max(0.0, b.covariance(a, a)));
         c.u = std::hypot(c.u_a, c.u_b);
-        c.budget = contributions(settings, a, c.u_a, b, out.inputs, out.sync_bound);
-        expand(settings, table, c);
-        for_use(settings, internal, out.ramps, c);
+        c.budget = contributions(a, c.u_a, b, out.inputs);
+        add_unseen(settings.uncertainty, all.value, out.sync_bound, internal, c.budget);
+        expand(settings.uncertainty, internal, static_cast<double>(table.dwells() - kOfGyro),
+               out.ramps.mean[internal % kGyros], c);
         widening.push_back(c.u_a / c.sigma);
     }
     out.widening = widening.empty() ? 1 : median(widening);

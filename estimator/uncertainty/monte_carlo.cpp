@@ -9,6 +9,7 @@
 
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/uncertainty/coverage.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {
@@ -93,10 +94,7 @@ DrawModel model_of(const Settings& settings, const Assessment& assessed) {
         for (Index j = 0; j < 3; ++j)
             m.value[3 * g + j] = assessed.drift[static_cast<std::size_t>(j)].value[g];
     }
-    m.local_g = m.value;
-    m.local_g.head<3>().setZero();
-    m.local_g.tail<18>() *= 2.0;
-    m.local_g *= settings.uncertainty.local_g.u;
+    m.local_g = settings.uncertainty.local_g.u * per_gravity(m.value);
     if (settings.uncertainty.sync_motion == SyncMotionOf::platform) m.sync = assessed.sync_bound;
     return m;
 }

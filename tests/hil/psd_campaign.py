@@ -59,6 +59,7 @@ def honest(checks, programs, folder):
     same_again(checks, programs, recorded, result, "live")
     replayed = survey_campaign.vibrig(programs, "replay", recorded, "--speed", "max")
     checks.check("as recorded, to the last bit" in replayed.stdout + replayed.stderr, "it replays to the last bit", replayed.stdout + replayed.stderr)
+    survey_campaign.replayed_again(checks, programs, rig, result)
     held = [row for row in result["spectrum"]["held_out"] if row["profile"] == "broad"]
     # Six rates; four sigma once in 2600 such tests.
     checks.check(len(held) == len(random.HELD_OUT) and all(abs(z) < 4 for row in held for z in row["z"]),

@@ -151,10 +151,12 @@ def check_octave(checks, rig, campaign):
 printf('%d %d %d %s %s %d\\n', rows(c.samples.force_g), columns(c.samples.force_g), rows(c.dwells.covariance), c.state, ...
        c.units.conditions.temperature_c, numel(c.interlocks));
 printf('%.17g ', d, u, c.coefficients.value, mean(c.samples.force_g), c.conditions.temperature_c(end), all(ok));
-try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end"""
+try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end
+c.result.spectrum.model = 'resonance'; vibrig.compensation(c, [45 10 90]);
+try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', e.message); end"""
     run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval", script], capture_output=True, text=True, timeout=120,
                          env={**os.environ, "RECORDING": str(campaign.folder)})
-    lines = run.stdout.splitlines() + ["", "", ""]
+    lines = run.stdout.splitlines() + ["", "", "", ""]
     checks.equal(lines[0], f"{campaign.samples.rows} 3 {campaign.dwells.rows} finished degC {len(campaign.interlocks)}",
                  "Octave opens the recording with its reader")
     expected = [*drift.drift_dph, *drift.residual_dph, *campaign.coefficients.value, *campaign.samples["force_g"].mean(axis=0),
@@ -162,6 +164,7 @@ try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end"""
     found = [float(x) for x in lines[1].split()]
     checks.check(len(found) == len(expected) and np.allclose(found, expected, rtol=1e-9), "with the same numbers", run.stdout + run.stderr)
     checks.check("expected a campaign's HDF5 file or its folder" in lines[2], "and says what it did not find", run.stderr)
+    checks.check("expected a level of 0" in lines[3], "and what its coefficients do not foretell", run.stdout + run.stderr)
 
 
 CHANNELS = "outer inner azimuth accel_x accel_y accel_z table_accel".split()
@@ -243,7 +246,7 @@ high = 2.0
     with open(paper, "w", encoding="utf-8") as file:
         file.write(text)
     issue = ["--paper", paper, "--by", "A. Person", "-o", "C-17"]
-    made = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket)
+    made = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket, "--json")
     path = str(campaign.parts[0])
     shutil.copy(path, path + ".kept")
     result = json.loads(json.dumps(campaign.result))
@@ -265,11 +268,13 @@ high = 2.0
     entry = json.loads(rows[0][1]) if rows else {}
     checks.check(len(rows) == 1 and rows[0][0].startswith("A. Person (") and rows[0][2] == 1 and entry.get("number") == "C-17" and
                  entry.get("pdf_sha256") == digest and whole["whole"], "the rig's signed journal has the PDF's SHA-256", f"{rows} {whole}")
-    checks.check(digest in made.stdout and not [name for name in os.listdir(rig.folder) if "unfinished" in name], "which is said, too", made.stdout)
+    issued = json.loads(made.stdout or "{}")
+    checks.check(issued.get("pdf_sha256") == digest and issued.get("json_sha256") == entry.get("json_sha256") and
+                 (issued.get("number"), issued.get("in_journal")) == ("C-17", True) and not [name for name in os.listdir(rig.folder) if "unfinished" in name], "which is said, too", made.stdout)
     printed = len(re.findall(rb"/Type */Page\b", open(pdf, "rb").read()))
     checks.check(1 < printed <= 5, "it is a few pages, its budget among them", f"{printed} pages")
-    again = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket)
-    checks.check(again.returncode == 1 and "issued already" in again.stderr, "a number is given once", again.stderr)
+    again = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket, "--json")
+    checks.check(again.returncode == 1 and "issued already" in again.stderr and "issued already" in json.loads(again.stdout)["refused"], "a number is given once", again.stderr)
     checks.equal(hashlib.sha256(open(pdf, "rb").read()).hexdigest(), digest, "and the one that has it stays as it is")
     nobody = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", os.path.join(rig.folder, "nobody"))
     checks.check(nobody.returncode == 2 and "--no-journal" in nobody.stderr, "without its daemon none is issued", nobody.stderr)

@@ -171,16 +171,26 @@ def missing_segment(checks, rig, folder):
     path = sorted(glob.glob(os.path.join(folder, "raw-0002.log*")))[0]
     aside = os.path.join(rig.folder, "aside.log")
     os.rename(path, aside)
-    for command in (("replay", *r.raw_logs(folder)), ("export", folder, "--to", "candump", "-o", "holed.log"), ("recover", folder)):
+    export = ("export", folder, "--to", "candump", "-o", "holed.log")
+    for command in (("replay", *r.raw_logs(folder)), export, ("recover", folder)):
         run = offline(rig, *command)
         checks.check(run.returncode == 1 and f"missing {os.path.basename(path)}, which the index has" in run.stdout + run.stderr,
                      f"{command[0]}: a missing segment is named", f"status {run.returncode} {run.stdout} {run.stderr}")
-    made = offline(rig, "report", folder, "-o", "holed.html")
+    said = json.loads(offline(rig, *export, "--json").stdout or "{}")
+    checks.check(said.get("whole") is False and said.get("file") == "holed.log", "and to machines", str(said))
+    made = offline(rig, "report", folder, "-o", "holed.html", "--json")
+    said = json.loads(made.stdout or "{}")
+    checks.check(said.get("file") == "holed.html" and said.get("pdf", "") is None and
+                 f"verdict: {said.get('verdict', {}).get('sentence')}\n" in made.stderr, "report --json has the verdict", made.stdout)
     with open(os.path.join(rig.folder, "holed.html"), encoding="utf-8") as file:
         checks.check(f"Missing: {os.path.basename(path)}, which the index has" in file.read(), "the report names it", made.stderr)
     os.rename(aside, path)
-    whole = offline(rig, "export", folder, "--to", "candump", "-o", "whole.log")
-    checks.check(whole.returncode == 0 and "missing" not in whole.stderr, "with it nothing is missing", whole.stderr)
+    whole = offline(rig, "export", folder, "--to", "candump", "-o", "whole.log", "--json")
+    checks.check(whole.returncode == 0 and "missing" not in whole.stderr and json.loads(whole.stdout or "{}").get("whole") is True,
+                 "with it nothing is missing", whole.stderr + whole.stdout)
+    both = offline(rig, "export", folder, "--to", "candump", "-o", "-", "--json")
+    checks.check(both.returncode == 2 and "--json: found it beside --output -" in both.stderr and not both.stdout,
+                 "JSON and a log do not share standard output", both.stderr)
     logs = r.raw_logs(folder)
     run = offline(rig, "replay", logs[1])
     checks.check(run.returncode == 1 and f"not read: {os.path.basename(logs[0])}" in run.stderr and "missing" not in run.stderr,

@@ -78,6 +78,7 @@ def survey(checks, programs, folder, dwell_s):
     finally:
         rig.stop()
     judge(checks, programs, rig, result, path, log, len(dwells), frequencies)
+    replayed_again(checks, programs, rig, result)
     identified_again(checks, programs, rig, result)
 
 
@@ -114,6 +115,7 @@ def judge(checks, programs, rig, result, path, log, dwells, frequencies):
     made = vibrig(programs, "report", recorded, "-o", page)
     checks.check(made.returncode == 0 and "Dwells held out from the fit" in open(page, encoding="utf-8").read(),
                  "and so has the report", made.stderr)
+    whoever_reads_it(checks, programs, rig, result, page)
     # The same coefficients without their elastic part are contradicted: the proof can fail.
     flat = vibrig(programs, "identify", recorded, "--spectrum", "flat", "--json")
     flat_path = os.path.join(rig.folder, "flat.json")
@@ -122,6 +124,49 @@ def judge(checks, programs, rig, result, path, log, dwells, frequencies):
     proof = vibrig(programs, "predict", flat_path, "--profile", profile, "--verify", recorded, "--json", "--force")
     checks.check(proof.returncode == 1 and '"contradicted"' in proof.stdout, "without the elastic part it is contradicted",
                  proof.stdout + proof.stderr)
+
+
+def whoever_reads_it(checks, programs, rig, result, page):
+    """Report, compensation and studies have the result over frequency, not that of the first frequency."""
+    recorded = recording(rig)
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    checks.equal([p["name"] for p in result["parameters"] if f"<td>{p['value']:.6f}</td><td>{p['expanded']:.6f}</td>" not in text], [],
+                 "the report has each value with its U")
+    checks.check("Of the dwells at rest and at 15.1 Hz alone" in text, "and says of which dwells the filter's are", text[:500])
+    run = vibrig(programs, "compensate", recorded, "--json")
+    said = json.loads(run.stdout) if run.stdout else {}
+    checks.equal([[c["value"], c["sigma"]] for c in said.get("coefficients", [])], [[p["value"], p["u"]] for p in result["parameters"]],
+                 "a compensation has the same coefficients")
+    checks.check("gyro z static" in (said.get("frequencies") or ""), "and says that they are static", run.stdout[-300:])
+    run = vibrig(programs, "compensate", recorded, "--platform-g", "3")
+    checks.check(run.returncode == 2 and "depend on the frequency" in run.stderr, "they do not foretell a vibration", run.stdout + run.stderr)
+    run = vibrig(programs, "uncertainty", recorded, "--monte-carlo")
+    checks.check(run.returncode == 2 and "at several frequencies" in run.stderr and not run.stdout, "nothing is drawn of them", run.stderr)
+    study = os.path.join(rig.folder, "again.toml")
+    with open(study, "w", encoding="utf-8") as file:
+        file.write(f'[study]\nname = "again"\nkind = "recordings"\nfolders = ["{os.path.relpath(rig.results, rig.folder)}"]\n')
+    shards = os.path.join(rig.folder, "again")
+    for command in (("plan", study, "-o", shards), ("run", shards), ("merge", shards, "--json")):
+        run = vibrig(programs, "study", *command)
+    found = (json.loads(run.stdout) if run.stdout else {}).get("recordings", [{}])[0]
+    old, new = found.get("old", {}), found.get("new", {})
+    # Of another instruction set: rounding.
+    checks.check(len(old.get("u", [])) == 30 and all(abs(a - b) < 1e-6 * u for a, b, u in zip(old["value"], new["value"], old["u"])) and
+                 all(abs(b / a - 1) < 1e-6 for a, b in zip(old["expanded"], new["expanded"])),
+                 "a study of recordings identifies it as it was", run.stdout[:3000] + run.stderr)
+
+
+def replayed_again(checks, programs, rig, result):
+    """The whole of the result, from the samples and from the frames alone."""
+    recorded = recording(rig)
+    for what, files in (("the recording", [recorded]), ("its frames", r.raw_logs(os.path.dirname(recorded)))):
+        again = vibrig(programs, "replay", *files, "--json")
+        same = json.loads(again.stdout) if again.stdout else {}
+        no = result["verdict"]["word"] == "not valid"
+        checks.check(again.returncode == no and all(same.get(key) == result[key] for key in ("parameters", "spectrum", "verdict")),
+                     f"a replay of {what} gives the result over frequency to the last bit",
+                     f"{again.stderr[-500:]} {[key for key in result if same.get(key) != result[key]]}")
 
 
 def identified_again(checks, programs, rig, result):

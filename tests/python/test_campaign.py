@@ -68,6 +68,18 @@ def test_compensation_by_hand(campaign):
         campaign.compensation([0, 0, 0], table_g=float("nan"))
 
 
+@pytest.mark.parametrize("model, refused", [("resonance", True), ("groups", True), ("flat", False)])
+def test_compensation_over_frequency(recording, model, refused):
+    recording.part(1, 10 * SECOND, [1, 2, 3], 2, result={"spectrum": {"model": model}})
+    campaign = vibrig.open(recording.folder)
+    assert campaign.compensation([0, 0, 0]).determined.all()
+    if refused:
+        with pytest.raises(ValueError, match="depend on the frequency, expected a level of 0"):
+            campaign.compensation([0, 0, 0], platform_g=3)
+    else:
+        assert campaign.compensation([0, 0, 0], platform_g=3).determined.all()
+
+
 def test_rows_of_a_dwell(campaign):
     assert campaign.of_dwell(0) == slice(0, 100)
     assert campaign.of_dwell(1) == slice(100, 200)

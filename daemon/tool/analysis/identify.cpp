@@ -40,9 +40,6 @@ int run(const IdentifyOptions& options) {
     const Identified identified = identify_recording(options.recording, options.config, request);
     const auto& assessed = identified.assessed;
     const auto* spectrum = identified.spectrum ? &*identified.spectrum : nullptr;
-    if (options.monte_carlo && spectrum != nullptr && spectrum->several())
-        throw std::runtime_error(
-            "--monte-carlo: found dwells at several frequencies, expected one frequency");
     if (!options.plot.empty()) report::plot_result(options.plot, identified.result, assessed);
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);

@@ -23,6 +23,7 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::tool {
 
@@ -37,6 +38,7 @@ struct CertificateArguments {
     std::string campaign, paper, output = "certificate", by;
     serve::Address at;
     bool no_journal = false;
+    bool json = false;
 };
 
 [[noreturn]] void refuse(const std::string& file, const toml::node& node, const std::string& what) {
@@ -182,6 +184,34 @@ void look_for_daemon(const CertificateArguments& arguments) {
     }
 }
 
+int refused(const CertificateArguments& arguments, const std::string& why) {
+    std::cerr << "refused: " << why << '\n';
+    if (arguments.json)
+        std::cout << proto::json_text(nlohmann::ordered_json{{"refused", why}}) << std::endl;
+    return kNo;
+}
+
+void say_issued(const CertificateArguments& arguments, const std::string& number,
+                const std::string& word) {
+    const std::string pdf = arguments.output + ".pdf", json = arguments.output + ".json";
+    const std::string hash = record::sha256_of_file(pdf);
+    if (arguments.json) {
+        std::cout << proto::json_text(
+                         nlohmann::ordered_json{{"number", number},
+                                                {"verdict", word},
+                                                {"pdf", pdf},
+                                                {"html", arguments.output + ".html"},
+                                                {"json", json},
+                                                {"pdf_sha256", hash},
+                                                {"json_sha256", record::sha256_of_file(json)},
+                                                {"in_journal", !arguments.no_journal}})
+                  << std::endl;
+        return;
+    }
+    std::cout << pdf << ": certificate " << number << ", " << word << ", SHA-256 " << hash
+              << (arguments.no_journal ? ", in no journal" : ", in the rig's journal") << std::endl;
+}
+
 int certify(const CertificateArguments& arguments) {
     Issue issue = read_paper(arguments.paper);
     issue.by = arguments.by;
@@ -202,7 +232,7 @@ int certify(const CertificateArguments& arguments) {
         Progress progress("replaying " + campaign.head.name);
         record::ReplayOptions options;
         options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
-        replayed = record::replay(campaign, report::settings_of(campaign), options);
+        replayed = record::replay(campaign, report::rig_of(campaign).estimator, options);
     }
     nlohmann::ordered_json certificate;
     try {
@@ -210,32 +240,25 @@ int certify(const CertificateArguments& arguments) {
             campaign, result.is_object() ? result : nlohmann::ordered_json::object(), replayed,
             issue);
     } catch (const report::Refused& why) {
-        std::cerr << "refused: " << why.what() << '\n';
-        return kNo;
+        return refused(arguments, why.what());
     }
     // They have their names once the journal knows them.
     const std::string unfinished = arguments.output + ".unfinished";
-    plot::write_file(unfinished + ".json", certificate.dump(2) + "\n");
+    plot::write_file(unfinished + ".json", proto::json_text(certificate, 2) + "\n");
     plot::write_file(unfinished + ".html", report::certificate_page(certificate));
     print_pdf(unfinished + ".html", unfinished + ".pdf");
-    const std::string refused =
+    const std::string no =
         arguments.no_journal
             ? ""
             : enter_in_journal(arguments, issue, campaign.head.campaign, unfinished);
     for (const char* kind : kKinds) {
-        if (refused.empty())
+        if (no.empty())
             fs::rename(unfinished + kind, arguments.output + kind);
         else
             fs::remove(unfinished + kind);
     }
-    if (!refused.empty()) {
-        std::cerr << "refused: " << refused << '\n';
-        return kNo;
-    }
-    const std::string word = certificate["verdict"]["word"], pdf = arguments.output + ".pdf";
-    std::cout << pdf << ": certificate " << issue.number << ", " << word << ", SHA-256 "
-              << record::sha256_of_file(pdf)
-              << (arguments.no_journal ? ", in no journal" : ", in the rig's journal") << '\n';
+    if (!no.empty()) return refused(arguments, no);
+    say_issued(arguments, issue.number, certificate["verdict"]["word"]);
     return 0;
 }
 
@@ -256,6 +279,7 @@ void add_certificate(CLI::App& app, int& exit_code) {
     add_socket(command, arguments.at);
     command.add_flag("--no-journal", arguments.no_journal,
                      "do not enter number and hashes in the rig's journal");
+    command.add_flag("--json", arguments.json, "print what was issued, or refused, as JSON");
     command.footer(
         "Example: vibrig certificate demo-20260301T080000Z --paper C-17.toml --by \"A. Person\"\n"
         "A result that is not valid is refused, a doubtful one marked. The SHA-256 of PDF and "

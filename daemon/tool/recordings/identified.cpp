@@ -16,6 +16,7 @@
 #include "daemon/configuration/random_profiles.hpp"
 #include "daemon/record/in_order.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/record/shaken.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "daemon/results/text_line.hpp"
@@ -43,11 +44,9 @@ struct Found {
     std::string contradiction;  ///< the first; empty: none
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
-    std::vector<estimator::spectrum::Sweep> sweeps;
     std::vector<SpectrumResult::HeldOut> kept_out;  ///< of a CSV file, by its roles
-    NumberedKinds profiles;                         ///< of a campaign's random dwells
     std::vector<estimator::DwellRow> rows;          ///< of a campaign, those apart included
-    PlayedBands psds;                               ///< of its random dwells
+    estimator::spectrum::Shaken shaken;
 };
 
 /// `rows`: of all dwells.
@@ -285,7 +284,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     estimator::Settings settings = rig.estimator;
     std::vector<Dwell> dwells = dwells_of(rows);
     Found found;
-    found.sweeps = take_sweeps(dwells, settings, file);
+    found.shaken.sweeps = take_sweeps(dwells, settings, file);
     const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
@@ -373,12 +372,7 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
-    std::vector<estimator::spectrum::Sweep> sweeps;
     for (const auto& dwell : dwells) {
-        if (dwell.order->sweep.any() && !dwell.cut_short) {
-            auto sweep = record::sweep_of(campaign, settings, dwell).finish();
-            if (!sweep.blocks.empty()) sweeps.push_back(std::move(sweep));
-        }
         doubts.begin_dwell();
         record::feed(identification, campaign, dwell,
                      [&](std::size_t sample, const estimator::StepResult&) {
@@ -392,7 +386,6 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
         with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
     record::qualify(campaign, dwells.size(), found.result);
     found.rows = identification.rows();
-    found.sweeps = std::move(sweeps);
     return found;
 }
 
@@ -402,7 +395,6 @@ Found identify_campaign(const std::string& path, const std::string& config,
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
-    record::number_psds(campaign);
     const auto loaded =
         config.empty()
             ? configuration::parse(record::identification_sections(campaign.head.configuration),
@@ -416,12 +408,7 @@ Found identify_campaign(const std::string& path, const std::string& config,
     }
     settings = dwells::Anew::settings_of(settings, campaign.found);
     Found found = identify(campaign, settings);
-    found.profiles = configuration::numbered_kinds(loaded.configuration);
-    for (const record::Order& order : campaign.orders) {
-        if (!order.played || order.played->place == 0) continue;
-        found.psds.push_back(configuration::reported_bands(
-            loaded.configuration, order.random.profile, order.random.level_db, order.psd));
-    }
+    found.shaken = record::shaken_of(campaign, loaded.configuration);
     return found;
 }
 
@@ -481,42 +468,43 @@ Identified identify_recording(const std::string& file, const std::string& config
         if (request.held_out) identified.held_out = held_out_of(found);
     }
     identified.result = std::move(found.result);
-    identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
-    if (found.spectral.size() > kMostSpectralDwells && found.kinds.size() > 1) {
+    auto [assessed, spectrum] =
+        assess(identified.settings, {}, identified.result, found.rows, found.shaken, request.form);
+    if (assessed.done && found.spectral.size() > kMostSpectralDwells && found.kinds.size() > 1) {
         identified.result.warnings.push_back(
             "found " + std::to_string(found.spectral.size()) + " dwells, expected at most " +
             std::to_string(kMostSpectralDwells) +
             " for coefficients over frequency: those at the reference frequency stand");
-    } else if (identified.assessed.done && found.spectral.size() >= 2 &&
+    } else if (assessed.done && found.spectral.size() >= 2 &&
                found.spectral.size() <= kMostSpectralDwells) {
-        identified.spectrum =
+        spectrum =
             spectrum_of(identified.settings, std::move(found.spectral), std::move(found.kinds),
-                        request.form, std::move(found.sweeps));
-        identified.spectrum->held_out = std::move(found.kept_out);
-        adopt(*identified.spectrum, identified.settings, identified.assessed);
-    } else if (identified.assessed.done) {
-        identified.spectrum = spectrum_of(identified.settings, found.rows, request.form,
-                                          found.profiles, std::move(found.sweeps), found.psds);
-        if (identified.spectrum)
-            adopt(*identified.spectrum, identified.settings, identified.assessed);
+                        request.form, std::move(found.shaken.sweeps));
+        spectrum->held_out = std::move(found.kept_out);
+        adopt(*spectrum, identified.settings, assessed);
     }
+    identified.assessed = std::move(assessed);
+    identified.spectrum = std::move(spectrum);
     for (const estimator::DwellRow& row : found.rows) {
         if (!row.held_out) continue;
         const auto profile = std::ranges::find_if(
-            found.profiles, [&row](const auto& one) { return one.first == row.profile; });
-        if (row.random && profile == found.profiles.end()) continue;
+            found.shaken.profiles, [&row](const auto& one) { return one.first == row.profile; });
+        if (row.random && profile == found.shaken.profiles.end()) continue;
         const double hz =
             row.commanded_hz > 0 ? row.commanded_hz : identified.settings.frequency_hz;
         identified.held_out.push_back(
             {row, row.random ? profile->second : estimator::spectrum::Kind{"", {{hz, 1, 0}}}});
-        if (row.psd > 0 && row.psd <= found.psds.size())
-            identified.held_out.back().kind.bands = found.psds[row.psd - 1];
+        if (row.psd > 0 && row.psd <= found.shaken.psds.size())
+            identified.held_out.back().kind.bands = found.shaken.psds[row.psd - 1];
     }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
 
 estimator::uncertainty::MonteCarlo draw(const Identified& of) {
+    if (of.spectrum && of.spectrum->several())
+        throw std::runtime_error(
+            "--monte-carlo: found dwells at several frequencies, expected one frequency");
     Progress progress("drawing");
     const estimator::uncertainty::MonteCarloSettings how;
     return estimator::uncertainty::propagate_distributions(

@@ -9,16 +9,19 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/candump_campaign.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/record/shaken.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_json.hpp"
 #include "daemon/results/result_table.hpp"
+#include "daemon/results/spectrum_text.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "estimator/filter/instruction_set.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -46,14 +49,14 @@ double replay_speed(const std::string& text) {
     return speed;
 }
 
-/// With --config its settings, else those of the recording.
-estimator::Settings replay_settings(const ReplayArguments& arguments,
-                                    const record::Campaign& campaign) {
+/// That of --config, else that of the recording.
+configuration::Configuration replayed_rig(const ReplayArguments& arguments,
+                                          const record::Campaign& campaign) {
     if (!arguments.config.empty())
-        return configuration::load(arguments.config, false).configuration.estimator;
+        return configuration::load(arguments.config, false).configuration;
     return configuration::parse(record::identification_sections(campaign.head.configuration),
                                 "configuration in " + campaign.path, false)
-        .configuration.estimator;
+        .configuration;
 }
 
 bool is_log(const std::string& path) { return path.ends_with(".log") || path.ends_with(".zst"); }
@@ -97,22 +100,43 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
 }
 
 /// The result; where it is not the recording's, with a word about that.
-std::string replayed_json(const record::ReplayResult& replayed,
-                          const estimator::uncertainty::Assessment& assessed,
+std::string replayed_json(const record::ReplayResult& replayed, const Assessed& found,
                           const estimator::Settings& settings, bool simulated, bool same_build) {
     std::optional<dwells::Live> live;
     if (replayed.found)
         live = {*replayed.found, replayed.live,
                 estimator::uncertainty::assess(settings, replayed.live)};
     std::string text =
-        result_json(replayed.result, assessed, simulated, nullptr, live ? &*live : nullptr);
+        result_json(replayed.result, found.assessed, simulated, nullptr, live ? &*live : nullptr,
+                    found.spectrum ? &*found.spectrum : nullptr);
     if (replayed.different == 0) return text;
     const nlohmann::ordered_json replay{{"dwells", replayed.compared},
                                         {"not_as_recorded", replayed.different},
                                         {"first", replayed.first_difference},
                                         {"same_build", same_build}};
     text.back() = ',';
-    return text + "\"replay\":" + replay.dump() + "}";
+    return text + "\"replay\":" + proto::json_text(replay) + "}";
+}
+
+void say_how_it_went(const record::ReplayResult& replayed, const record::Head& recorded,
+                     bool same_build) {
+    std::cerr << line("%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
+                      replayed.samples, replayed.dwells.size(), replayed.recorded_s,
+                      replayed.took_s,
+                      replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
+    if (replayed.compared > 0) {
+        if (replayed.different == 0) {
+            std::cerr << "estimates after each of " << replayed.compared
+                      << " dwells: as recorded, to the last bit\n";
+        } else {
+            std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
+                      << " dwells are not as recorded (" << replayed.first_difference
+                      << "); recorded by " << recorded.version << ", " << recorded.compiler << ", "
+                      << recorded.instruction_set << "; this is " << VIBRIG_VERSION << ", "
+                      << estimator::compiler() << ", " << estimator::instruction_set()
+                      << (same_build ? ": expected the same\n" : "\n");
+        }
+    }
 }
 
 int replay(const ReplayArguments& arguments) {
@@ -126,7 +150,8 @@ int replay(const ReplayArguments& arguments) {
         campaign = replayed_campaign(arguments);
         if (!arguments.config.empty()) record::forget_noise(campaign);
     }
-    const estimator::Settings settings = replay_settings(arguments, campaign);
+    const configuration::Configuration rig = replayed_rig(arguments, campaign);
+    const estimator::Settings& settings = rig.estimator;
     record::ReplayResult replayed;
     {
         Progress progress("replaying");
@@ -145,31 +170,17 @@ int replay(const ReplayArguments& arguments) {
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
                             campaign.head.instruction_set == estimator::instruction_set();
-    const auto assessed = dwells::assess(settings, replayed.found, replayed.result);
+    const auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
+                              record::shaken_of(campaign, rig));
+    const auto& assessed = found.assessed;
     const bool simulated = campaign.head.simulated;
     if (!arguments.plot.empty()) report::plot_result(arguments.plot, replayed.result, assessed);
     std::cout << (arguments.json
-                      ? replayed_json(replayed, assessed, settings, simulated, same_build) + "\n"
-                      : simulated_line(simulated) + result_table(replayed.result, assessed))
+                      ? replayed_json(replayed, found, settings, simulated, same_build) + "\n"
+                      : simulated_line(simulated) + result_table(replayed.result, assessed) +
+                            (found.spectrum ? spectrum_text(*found.spectrum) : ""))
               << std::flush;
-    std::cerr << line("%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
-                      replayed.samples, replayed.dwells.size(), replayed.recorded_s,
-                      replayed.took_s,
-                      replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
-    if (replayed.compared > 0) {
-        if (replayed.different == 0) {
-            std::cerr << "estimates after each of " << replayed.compared
-                      << " dwells: as recorded, to the last bit\n";
-        } else {
-            std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
-                      << " dwells are not as recorded (" << replayed.first_difference
-                      << "); recorded by " << campaign.head.version << ", "
-                      << campaign.head.compiler << ", " << campaign.head.instruction_set
-                      << "; this is " << VIBRIG_VERSION << ", " << estimator::compiler() << ", "
-                      << estimator::instruction_set()
-                      << (same_build ? ": expected the same\n" : "\n");
-        }
-    }
+    say_how_it_went(replayed, campaign.head, same_build);
     if (!std::cout) throw std::runtime_error("standard output: cannot be written");
     const bool as_recorded = replayed.different == 0 || !same_build;
     return whole && as_recorded ? exit_status(assessed.verdict.level, arguments.strict) : kNo;

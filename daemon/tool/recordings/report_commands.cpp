@@ -13,17 +13,22 @@
 #include "daemon/archive/trend.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/record/shaken.hpp"
 #include "daemon/report/journal_section.hpp"
 #include "daemon/report/report.hpp"
+#include "daemon/results/assessment_json.hpp"
 #include "daemon/results/exit_status.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_table.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/tool/simulated.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -38,6 +43,7 @@ struct ReportArguments {
     std::string campaign, output = "report.html", config, compare, pdf, journal;
     bool strict = false;
     bool same_unit = false;
+    bool json = false;
     ArchiveOptions archive = {};
 };
 
@@ -47,9 +53,9 @@ struct CompensateArguments {
     std::vector<double> attitude{0, 0, 0};
 };
 
-estimator::Settings report_settings(const record::Campaign& campaign, const std::string& config) {
-    return config.empty() ? report::settings_of(campaign)
-                          : configuration::load(config, false).configuration.estimator;
+configuration::Configuration rig_of(const record::Campaign& campaign, const std::string& config) {
+    return config.empty() ? report::rig_of(campaign)
+                          : configuration::load(config, false).configuration;
 }
 
 /// This campaign's coefficients beside those of the unit's earlier ones in an archive.
@@ -94,7 +100,7 @@ int make_report(const ReportArguments& arguments) {
     keep_recordings(arguments.pdf);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
-    const auto settings = report_settings(campaign, arguments.config);
+    const auto rig = rig_of(campaign, arguments.config);
     std::optional<report::Earlier> earlier;
     if (!arguments.compare.empty()) {
         earlier = report::earlier_of(read_named_campaign(arguments.compare), campaign,
@@ -104,7 +110,7 @@ int make_report(const ReportArguments& arguments) {
     report::Analysis analysis;
     {
         Progress progress("analysing " + campaign.head.name);
-        analysis = report::analyse(campaign, settings, [&](double fraction) {
+        analysis = report::analyse(campaign, rig, [&](double fraction) {
             progress.show(static_cast<std::size_t>(100 * fraction), 100);
         });
     }
@@ -126,6 +132,14 @@ int make_report(const ReportArguments& arguments) {
     }
     const auto& verdict = analysis.assessed.verdict;
     std::cerr << "verdict: " << verdict.sentence << '\n';
+    if (arguments.json) {
+        Json written{{"campaign", campaign.head.name},
+                     {"file", arguments.output},
+                     {"pdf", text_or_null(arguments.pdf)},
+                     {"compared_with", text_or_null(earlier ? earlier->path : "")}};
+        written["verdict"] = assessment_json(analysis.assessed)["verdict"];
+        std::cout << proto::json_text(written) << std::endl;
+    }
     return exit_status(verdict.level, arguments.strict);
 }
 
@@ -147,7 +161,8 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
 }
 
 std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
-                              const estimator::Settings& settings, const Json& prediction) {
+                              const estimator::Settings& settings, const std::string& frequencies,
+                              const Json& prediction) {
     Json root;
     root["simulated"] = campaign.head.simulated;
     if (campaign.head.simulated) root["note"] = kSimulatedRig;
@@ -173,8 +188,9 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
         root["axes"][printed("gyro_%c", "xyz"[g])] = std::move(axes);
     }
     root["drift_sign"] = settings.drift_sign;
+    root["frequencies"] = text_or_null(frequencies);
     root["prediction"] = prediction;
-    return root.dump(2) + "\n";
+    return proto::json_text(root, 2) + "\n";
 }
 
 std::string axes_line(const estimator::Settings& settings) {
@@ -281,6 +297,27 @@ double level_of(const char* option, const std::string& text) {
     return level;
 }
 
+/// What the quadratic coefficients are of; empty: there is one frequency. Throws where they say
+/// nothing of the drift under vibration.
+std::string about_frequencies(const std::string& path, const Assessed& of, double level_g) {
+    if (!of.spectrum) return {};
+    using estimator::spectrum::Form;
+    const auto form = of.spectrum->analysis.form;
+    if (form == Form::flat) return "of several frequencies, at which they do not differ";
+    if (level_g > 0)
+        throw std::runtime_error(
+            path +
+            ": found quadratic coefficients that depend on the frequency, expected no "
+            "--platform-g or --table-g (vibrig predict has the drift under a vibration)");
+    std::string text = "of several frequencies, at which quadratic ones differ; here they are";
+    for (std::size_t j = 0; j < 3; ++j) {
+        const double hz = of.spectrum->at_hz(10 * j + 4);
+        text += printed("%s gyro %c ", j == 0 ? "" : ",", "xyz"[j]) +
+                (hz > 0 ? printed("at %g Hz", hz) : std::string("static"));
+    }
+    return text;
+}
+
 void check_finite(const std::string& path, const report::Coefficients& c) {
     for (std::size_t i = 0; i < kParameters; ++i) {
         for (const double number : {c.value[i], c.sigma[i]}) {
@@ -306,11 +343,14 @@ int compensate(const CompensateArguments& arguments) {
     keep_recordings(arguments.output);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
-    report::Coefficients coefficients;
-    estimator::Settings settings = report_settings(campaign, arguments.config);
+    const auto rig = rig_of(campaign, arguments.config);
+    const estimator::Settings& settings = rig.estimator;
     const auto replayed = record::replay(campaign, settings, {});
-    coefficients = report::combined(dwells::assess(settings, replayed.found, replayed.result),
-                                    report::final_coefficients(campaign.path, replayed));
+    const auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
+                              record::shaken_of(campaign, rig));
+    const auto coefficients =
+        report::combined(found.assessed, report::final_coefficients(campaign.path, replayed));
+    const std::string frequencies = about_frequencies(campaign.path, found, level);
     check_finite(campaign.path, coefficients);
     if (arguments.table_g) level *= settings.transmission;
     const double kappa = 1 + level * level / 2;
@@ -324,17 +364,22 @@ int compensate(const CompensateArguments& arguments) {
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
     auto comments = comment_lines(settings, predicted, arguments, kappa);
+    if (!frequencies.empty()) comments.insert(comments.begin(), frequencies);
     const bool simulated = campaign.head.simulated;
     // In the header it has a comment of its own.
     if (simulated && arguments.format == "csv") comments.insert(comments.begin(), kSimulatedRig);
     const std::string text =
-        arguments.format == "json"  ? coefficients_json(campaign, coefficients, settings,
-                                                        prediction_json(predicted, arguments, kappa))
+        arguments.format == "json"
+            ? coefficients_json(campaign, coefficients, settings, frequencies,
+                                prediction_json(predicted, arguments, kappa))
         : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
         : arguments.format == "c"
             ? coefficients_header(campaign, coefficients, comments)
             : simulated_line(simulated) +
-                  coefficients_text(coefficients, axes_line(settings), predicted, arguments, kappa);
+                  coefficients_text(
+                      coefficients,
+                      axes_line(settings) + (frequencies.empty() ? "" : "\n" + frequencies),
+                      predicted, arguments, kappa);
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {
@@ -366,6 +411,7 @@ void add_reports(CLI::App& app, int& exit_code) {
                          "show the unit's earlier campaigns in this archive (default: "
                          "$VIBRIG_ARCHIVE)");
     reporting.add_option("--pdf", report.pdf, "print it to this PDF file, too (with chromium)");
+    reporting.add_flag("--json", report.json, "print what was written, and the verdict, as JSON");
     reporting.add_flag("--strict", report.strict, "a doubtful result is a no as well");
     reporting.footer(
         "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "

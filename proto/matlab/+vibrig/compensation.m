@@ -5,7 +5,8 @@ function [drift, residual, determined] = compensation(campaign, attitude_deg, va
 %
 %   ATTITUDE_DEG are encoder angles outer, inner, azimuth; 'table_g' or 'platform_g' the peak of the vibration, neither:
 %   at rest. DRIFT and RESIDUAL (1 sigma) are deg/h about the input axes of gyros x, y, z (3 x 1), as `vibrig compensate`
-%   gives them: h.D and sqrt(h'Ph) of Tang et al. 2009, eqs 8-9 with k1 = 1, k2 = 1 + a^2 / 2.
+%   gives them. Quadratic coefficients that depend on the frequency foretell no vibration: then the level must be 0.
+%   They are h.D and sqrt(h'Ph) of Tang et al. 2009, eqs 8-9 with k1 = 1, k2 = 1 + a^2 / 2.
 if numel(attitude_deg) ~= 3 || ~all(isfinite(attitude_deg))
   error('vibrig:argument', 'attitude_deg: expected three angles, deg');
 end
@@ -19,6 +20,11 @@ for i = 1:2:numel(varargin)
 end
 if ~(level >= 0 && level <= 1000)
   error('vibrig:argument', 'level: found %g, expected 0 to 1000 g', level);
+end
+if level > 0 && isfield(campaign.result, 'spectrum') && isfield(campaign.result.spectrum, 'model') ...
+    && ~strcmp(campaign.result.spectrum.model, 'flat')
+  error('vibrig:argument', ['found quadratic coefficients that depend on the frequency, expected a level of 0 ' ...
+                            '(vibrig predict has the drift under a vibration)']);
 end
 kappa = 1 + level^2 / 2;
 turned = value_of(campaign, 'platform.encoder_sign') .* (attitude_deg(:)' - value_of(campaign, 'platform.encoder_zero_deg'));

@@ -221,7 +221,7 @@ class Campaign:
         """What the gyros drift at an attitude under vibration, and what compensation leaves; as `vibrig compensate`.
 
         `attitude_deg`: encoder angles outer, inner, azimuth; peak at the table or at the platform, g, neither: at rest.
-        Raises ValueError.
+        Raises ValueError, also where the quadratic coefficients depend on the frequency and the level is not 0.
         """
         if table_g is not None and platform_g is not None:
             raise ValueError("table_g: found it beside platform_g, expected one of them")
@@ -235,6 +235,11 @@ class Campaign:
             axes = [platform[f"gyro_{g}_axes"] for g in "xyz"]
         if not 0 <= level <= 1000:
             raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")
+        with _reading(self.parts[-1]):
+            model = (self.result.get("spectrum") or {}).get("model", "flat")
+        if level > 0 and model != "flat":
+            raise ValueError(f"{self.parts[0]}: found quadratic coefficients that depend on the frequency, expected a level "
+                             "of 0 (vibrig predict has the drift under a vibration)")
         with _reading(self.parts[0]):
             return self.coefficients.drift(up, 1 + level**2 / 2, axes)
 

@@ -495,7 +495,6 @@ TEST_F(DwellBookTest, ResumedAfterAnyOfItsDwellsItComesToTheLiveState) {
 TEST_F(DwellBookTest, ReplayedItComesToTheLiveState) {
     auto campaign = record::read_campaign(folder_.string());
     record::place_played(campaign);
-    record::number_psds(campaign);
     for (const bool noise_known : {true, false}) {
         SCOPED_TRACE(noise_known ? "with the noise recorded" : "with the monitor's noise again");
         if (!noise_known) record::forget_noise(campaign);
@@ -544,7 +543,6 @@ TEST_F(DwellBookTest, IdentifiedAnewFromJournalAndRecordingItIsTheSame) {
     }
     auto campaign = record::read_campaign(folder_.string());
     record::place_played(campaign);
-    record::number_psds(campaign);
     const auto of_recording = record::anew(campaign, estimator::Settings{}, *found);
     const auto left = of_journal.result(), right = of_recording.result();
     EXPECT_EQ(left.value, right.value);

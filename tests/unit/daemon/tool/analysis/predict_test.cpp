@@ -66,6 +66,54 @@ TEST_F(Predict, TheBudgetSaysWhatWasDeclaredAndHow) {
                 ::testing::MatchesRegex("[0-9]+ Hz"));
 }
 
+TEST_F(Predict, WhatNoDwellShowsIsInTheBudgetOverFrequencyToo) {
+    write("place.toml",
+          "[uncertainty]\nlocal_g = { u = 0.01, dof = 4 }\nsync_motion = \"platform\"\n"
+          "turn_on_bias = 0.2\nturn_on_linear = 0.03\n");
+    const PredictJson found = run("identify survey.csv --config place.toml --json").json();
+    const PredictJson plain = run("identify survey.csv --json").json();
+    for (const std::size_t i : {0U, 1U, 4U}) {
+        const PredictJson& c = found["parameters"][i];
+        EXPECT_EQ(c["value"], plain["parameters"][i]["value"]);
+        double square = 0, of_g = 0;
+        bool sync = false;
+        for (const PredictJson& one : c["budget"]) {
+            const double part = one["contribution"];
+            square += part * part;
+            if (one["input"] == "local_g") of_g = part;
+            sync = sync || one["input"] == "sync_motion";
+        }
+        const double value = c["value"], u = c["u"];
+        // The bias knows no gravity, a linear term goes with it, a quadratic one with its square.
+        const double power = i == 0 ? 0 : i == 1 ? 1 : 2;
+        EXPECT_NEAR(of_g, 0.01 * power * std::abs(value), 1e-12) << c["name"];
+        EXPECT_EQ(sync, i == 4) << c["name"];
+        EXPECT_NEAR(square / (u * u), 1, 1e-6) << c["name"];
+        EXPECT_NEAR(found["covariance_combined"][i][i].get<double>() / (u * u), 1, 1e-9);
+        EXPECT_NEAR(c["expanded"].get<double>(), c["k"].get<double>() * u, 1e-12);
+        // For another power-on: of this u, not of that at one frequency.
+        const double again = i == 0 ? 0.2 : i == 1 ? 0.03 : 0;
+        EXPECT_GE(c["u_use"].get<double>(), std::hypot(u, again) * (1 - 1e-9)) << c["name"];
+        EXPECT_LT(c["u_use"].get<double>(), 1.01 * std::hypot(u, again)) << c["name"];
+    }
+    // Gravity is most of what is not known of D_Ix, and it is known from five measurements:
+    // Student's factor of 4 degrees of freedom is 2.78.
+    const PredictJson& linear = found["parameters"][1];
+    EXPECT_GT(linear["k"].get<double>(), 2);
+    EXPECT_LT(linear["nu_eff"].get<double>(), plain["parameters"][1]["nu_eff"].is_null()
+                                                  ? 1e9
+                                                  : plain["parameters"][1]["nu_eff"].get<double>());
+}
+
+TEST_F(Predict, NothingIsDrawnOfSeveralFrequencies) {
+    for (const char* command : {"identify", "uncertainty"}) {
+        const Ended ended = run(std::string(command) + " survey.csv --monte-carlo");
+        EXPECT_EQ(ended.exit_code, 2);
+        EXPECT_THAT(ended.error, HasSubstr("--monte-carlo: found dwells at several frequencies"));
+        EXPECT_EQ(ended.out, "");
+    }
+}
+
 TEST_F(Predict, InGroupsACoefficientIsThatAtTheLowestFrequency) {
     const Ended ended = run("identify survey.csv --spectrum groups --json");
     ASSERT_EQ(ended.exit_code, 0) << ended.error;

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "estimator/filter/declared.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+
+/// What makes of a coefficient's parts its U: for coefficients at one frequency and over several.
+namespace vibrig::estimator::uncertainty {
+
+/// Change of the 30 coefficients per relative change of local gravity, from their values; filter
+/// order. Linear terms go with g, quadratic ones with its square.
+[[nodiscard]] Eigen::VectorXd per_gravity(const Eigen::VectorXd& value);
+
+/// What no dwell shows of the 30, filter order: gravity known to u(local_g), and, where the
+/// platform is declared to move in step with the vibration, up to `sync_bound` on the quadratic
+/// ones, deg/h/g^2.
+[[nodiscard]] Eigen::MatrixXd unseen_covariance(const Inputs& inputs, const Eigen::VectorXd& value,
+                                                double sync_bound);
+/// The same of coefficient `internal`, as parts of its budget.
+void add_unseen(const Inputs& inputs, const Eigen::VectorXd& value, double sync_bound,
+                std::size_t internal, std::vector<Contribution>& budget);
+
+/// Sorts the budget of coefficient `internal`, and sets nu_eff by Welch and Satterthwaite, k,
+/// expanded and u_use, from sigma, u_a, u and the budget. `spare`: dwells more than coefficients
+/// fitted to them; `ramp`: mean ramp of the bias in a dwell, deg/h per 100 s.
+/// docs/theory/uncertainty.md.
+void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c);
+
+}  // namespace vibrig::estimator::uncertainty
