@@ -76,7 +76,8 @@ Chart uncertainties_chart(const estimator::Result& result, const Assessment& of)
     Curve combined{.name = "combined, u", .look = Look::dots};
     for (std::size_t i = 0; i < kParameters; ++i) {
         for (auto* curve : {&noise, &combined}) curve->x.push_back(static_cast<double>(i + 1));
-        noise.y.push_back(result.observable[i] ? result.sigma[i] : std::nan(""));
+        const double sigma = of.over_frequency ? of.coefficients[i].noise : result.sigma[i];
+        noise.y.push_back(result.observable[i] ? sigma : std::nan(""));
         combined.y.push_back(of.done && result.observable[i] ? of.coefficients[i].u : std::nan(""));
     }
     chart.curves = {std::move(noise), std::move(combined)};

@@ -59,7 +59,7 @@ Rows budget_rows(const uncertainty::Assessment& a) {
         const std::string parts = largest_parts(c);
         rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.expanded),
                         fmt::format("{:.2f}", c.k), estimator::parameter_unit(i),
-                        fmt::format("{:.6f}", c.u), fmt::format("{:.6f}", c.sigma), parts});
+                        fmt::format("{:.6f}", c.u), fmt::format("{:.6f}", c.noise), parts});
     }
     return rows;
 }

@@ -37,7 +37,7 @@ std::string with_uncertainty(const estimator::Result& result, const Assessment& 
         const auto& of = assessed.coefficients[i];
         text += line("%-12s %12s %11s %11s %11s  %-10s %s", estimator::parameter_names()[i],
                      number("%.6f", of.value).c_str(), number("%.6f", of.u).c_str(),
-                     number("%.6f", of.expanded).c_str(), number("%.6f", of.sigma).c_str(),
+                     number("%.6f", of.expanded).c_str(), number("%.6f", of.noise).c_str(),
                      estimator::parameter_unit(i), result.observable[i] ? "yes" : "no");
     }
     return text;

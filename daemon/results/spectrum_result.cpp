@@ -70,6 +70,7 @@ void tell_coefficients(const SpectrumResult& spectrum, const uncertainty::Inputs
         const auto a = static_cast<Index>(internal);
         c.value = of.value[a];
         c.u_a = std::sqrt(of.covariance_a(a, a));
+        c.noise = std::min(of.noise[a], c.u_a);
         c.u = std::sqrt(combined(a, a));
         c.u_b = std::sqrt(std::max(0.0, c.u * c.u - c.u_a * c.u_a));
         c.budget.clear();
@@ -180,6 +181,7 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
            uncertainty::Assessment& assessed) {
     if (!spectrum.several()) return;
     const Analysis& of = spectrum.analysis;
+    assessed.over_frequency = true;
     tell_coefficients(spectrum, settings.uncertainty, assessed);
     assessed.rates = rates_of(spectrum);
     if (of.flat.alarm && of.form != Form::resonance)

@@ -15,7 +15,6 @@ struct IdentifiedRecording {
     estimator::Settings settings;
     record::ReplayResult replayed;
     estimator::uncertainty::Assessment assessed;
-    bool over_frequency = false;
 };
 /// Throws StudyError if it is not what was planned, else what reading and replaying throw.
 [[nodiscard]] IdentifiedRecording identify_recording(const Recording& recording,

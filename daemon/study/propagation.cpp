@@ -33,7 +33,7 @@ struct PropagationWorker::Model {
     Model(const Recording& recording, const std::vector<Setting>& settings)
         : found(identify_recording(recording, settings)),
           drawing(uncertainty::block_drawing(found.settings, found.assessed)) {
-        if (found.over_frequency)
+        if (found.assessed.over_frequency)
             throw StudyError(recording.folder +
                              ": found dwells at several frequencies, expected one frequency");
     }

@@ -186,13 +186,11 @@ IdentifiedRecording identify_recording(const Recording& recording,
                             campaign.result_json,
                             loaded.estimator,
                             record::replay(campaign, loaded.estimator, {}),
-                            {},
-                            false};
-    auto found = tool::assess(out.settings, out.replayed.found, out.replayed.result,
-                              out.replayed.rows, record::shaken_of(campaign, loaded));
+                            {}};
+    out.assessed = tool::assess(out.settings, out.replayed.found, out.replayed.result,
+                                out.replayed.rows, record::shaken_of(campaign, loaded))
+                       .assessed;
     out.settings = dwells::Anew::settings_of(out.settings, out.replayed.found);
-    out.assessed = std::move(found.assessed);
-    out.over_frequency = found.spectrum.has_value();
     return out;
 }
 

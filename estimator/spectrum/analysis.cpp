@@ -279,6 +279,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     std::array<GyroProblem, 3> problems;
     std::array<uncertainty::DriftAverage, 3> groups;
     std::array<MatrixXd, 3> if_flat, gains;
+    MatrixXd variance(3, n);  ///< of the dwells' rates, of noise
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -288,6 +289,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
             groups[j] = uncertainty::average_drift(gyro, settings.drift);
             const uncertainty::DriftAverage& average = groups[j];
+            variance.row(g) = gyro.variance.transpose();
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
@@ -315,6 +317,12 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
                                         : gain(table, j, problems[j], out.gyros[j].list.front());
+    out.noise.resize(3 * kBase);
+    for (Index j = 0; j < 3; ++j) {
+        const auto& g = gains[static_cast<std::size_t>(j)];
+        for (Index a = 0; a < kBase; ++a)
+            out.noise[3 * a + j] = std::sqrt(g.row(a).cwiseAbs2().dot(variance.row(j)));
+    }
     const MatrixXd effect = add_effects(gains, declared, out);
     if (form == Form::groups)
         put_groups(groups, effect, out);

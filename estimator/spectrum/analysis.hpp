@@ -31,6 +31,9 @@ struct Analysis {
     /// likelier, else of those under the lowest kind of vibration; in groups those of the lowest.
     Eigen::VectorXd value;
     Eigen::MatrixXd covariance_a, covariance;
+    /// What of covariance_a the dwells' noise alone leaves in the likeliest hypothesis, as standard
+    /// deviations; filter order.
+    Eigen::VectorXd noise;
 
     /// For some gyro a resonance is likelier than none.
     [[nodiscard]] bool resonant() const;

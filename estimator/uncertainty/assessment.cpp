@@ -270,6 +270,7 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
         c.value_constant = fit.value()[a];
         c.sigma = std::sqrt(fit.covariance()(a, a));
         c.u_a = std::sqrt(all.covariance(a, a));
+        c.noise = std::min(c.sigma, c.u_a);
         c.u_b = std::sqrt(std::max(0.0, b.covariance(a, a)));
         c.u = std::hypot(c.u_a, c.u_b);
         c.budget = contributions(a, c.u_a, b, out.inputs);

@@ -30,6 +30,7 @@ struct Coefficient {
     double value = kNone;           ///< with a bias that may have moved, its mean over the dwells
     double value_constant = kNone;  ///< with a constant bias
     double sigma = kNone;           ///< noise only, of value_constant
+    double noise = kNone;           ///< noise only, of value: no more than u_a
     double u_a = kNone, u_b = kNone, u = kNone;
     double nu_eff = kNone, k = kNone, expanded = kNone;
     double u_use = kNone;              ///< of what it will be after the next switch-on
@@ -71,7 +72,8 @@ struct CrossAxis {
 
 /// Everything that follows from the rows of a campaign's dwells.
 struct Assessment {
-    bool done = false;                                  ///< there were rows to work on
+    bool done = false;            ///< there were rows to work on
+    bool over_frequency = false;  ///< coefficients of several frequencies took their place
     std::array<Coefficient, kParameters> coefficients;  ///< order of parameter_names()
     /// Type A, and with the declared inputs: 30 x 30, order of parameter_names().
     Eigen::MatrixXd covariance_a, covariance_combined;

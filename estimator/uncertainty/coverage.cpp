@@ -68,7 +68,7 @@ void add_unseen(const Inputs& inputs, const VectorXd& value, double sync_bound,
 void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c) {
     std::stable_sort(c.budget.begin(), c.budget.end(),
                      [](const auto& x, const auto& y) { return x.contribution > y.contribution; });
-    const double rho = std::min(1.0, c.sigma * c.sigma / (c.u_a * c.u_a));
+    const double rho = std::min(1.0, c.noise * c.noise / (c.u_a * c.u_a));
     double inverse = rho * rho / inputs.noise_dof;
     if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
     double sum = std::pow(c.u_a, 4) * inverse;

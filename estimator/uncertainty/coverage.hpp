@@ -24,7 +24,7 @@ void add_unseen(const Inputs& inputs, const Eigen::VectorXd& value, double sync_
                 std::size_t internal, std::vector<Contribution>& budget);
 
 /// Sorts the budget of coefficient `internal`, and sets nu_eff by Welch and Satterthwaite, k,
-/// expanded and u_use, from sigma, u_a, u and the budget. `spare`: dwells more than coefficients
+/// expanded and u_use, from noise, u_a, u and the budget. `spare`: dwells more than coefficients
 /// fitted to them; `ramp`: mean ramp of the bias in a dwell, deg/h per 100 s.
 /// docs/theory/uncertainty.md.
 void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c);

@@ -103,7 +103,7 @@ std::string allowance_table(const Assessment& assessed) {
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
             const Coefficient& c = assessed.coefficients[i];
             if (kind_of(i) != k || !(c.u > 0)) continue;
-            values[0].push_back(c.sigma);
+            values[0].push_back(c.noise);
             values[1].push_back(c.u);
             values[2].push_back(c.expanded);
         }

@@ -502,7 +502,7 @@ Identified identify_recording(const std::string& file, const std::string& config
 }
 
 estimator::uncertainty::MonteCarlo draw(const Identified& of) {
-    if (of.spectrum && of.spectrum->several())
+    if (of.assessed.over_frequency)
         throw std::runtime_error(
             "--monte-carlo: found dwells at several frequencies, expected one frequency");
     Progress progress("drawing");

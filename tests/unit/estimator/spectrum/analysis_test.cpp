@@ -84,5 +84,28 @@ TEST(Groups, AreRefusedForPredictions) {
     EXPECT_EQ(found.groups.value.rows(), 4 + 6 * 7);
 }
 
+TEST(Noise, IsAllOfWhatIsNotKnownWhereTheBiasStandsAndLessWhereItMoves) {
+    Settings settings = undeclared();
+    for (const bool stands : {true, false}) {
+        settings.drift.model =
+            stands ? uncertainty::BiasModel::constant : uncertainty::BiasModel::walk;
+        settings.drift.walk_deg_h_rt_h = 0.1;
+        std::mt19937_64 random(1);
+        Dwells dwells = dwells_of(settings, {}, survey());
+        add_noise(dwells, random);
+        const Analysis found =
+            analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), Form::flat);
+        const Eigen::VectorXd share =
+            found.noise.cwiseQuotient(found.covariance_a.diagonal().cwiseSqrt());
+        EXPECT_LT(share.maxCoeff(), 1 + 1e-9);
+        // Of 63 dwells a prior of deg/h is nothing; a bias that walks is most of what is not known
+        // of its mean.
+        if (stands)
+            EXPECT_GT(share.minCoeff(), 0.999);
+        else
+            EXPECT_LT(share[0], 0.5);
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::spectrum

@@ -50,7 +50,7 @@ TEST(Coverage, TheBudgetHasTheCovarianceOfWhatNoDwellShows) {
 
 Coefficient of_parts(double noise, double part, double dof) {
     Coefficient c;
-    c.sigma = c.u_a = noise;
+    c.noise = c.u_a = noise;
     c.u_b = part;
     c.u = std::hypot(noise, part);
     c.budget = {{"noise and drift states", "", 1, noise, noise, Shape::normal,
@@ -79,7 +79,7 @@ TEST(Coverage, WhatTheSpreadOfTheDwellsSaysHasTheDegreesTheySpare) {
     inputs.noise_dof = 1e9;
     Coefficient c = of_parts(1, 0, 1);
     c.budget.pop_back();
-    c.sigma = 1e-6;  // all of u_a is from what the rates scatter
+    c.noise = 1e-6;  // all of u_a is from what the rates scatter
     expand(inputs, 0, 4, 0, c);
     EXPECT_NEAR(c.nu_eff, 4, 1e-6);
     EXPECT_NEAR(c.k, 2.776, 1e-3);
