@@ -36,6 +36,26 @@ MatrixXd prior_sigmas(const Settings& settings) {
 }
 
 /// The rates of a gyro with the groups model, what is not known of their vibration in the noise.
+/// Of gyro j's rate; `shaken`: its part due to the vibration.
+double variance_of(const SpectralDwell& dwell, std::size_t j, double shaken) {
+    const double level = dwell.relative_error * shaken;
+    return dwell.row.variance[j][j] + level * level;
+}
+
+/// What the gains, kBase x n for each gyro, let through of the rates' noise.
+VectorXd noise_of(const SpectralTable& table, const std::array<MatrixXd, 3>& gains,
+                  const MatrixXd& shaken) {
+    VectorXd out(3 * kBase), variance(table.dwells());
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Index>(j);
+        for (Index k = 0; k < table.dwells(); ++k)
+            variance[k] = variance_of(table.list()[static_cast<std::size_t>(k)], j, shaken(k, g));
+        for (Index a = 0; a < kBase; ++a)
+            out[3 * a + g] = std::sqrt(gains[j].row(a).cwiseAbs2().dot(variance));
+    }
+    return out;
+}
+
 uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::DwellTable& times,
                                 const VectorXd& prior, std::size_t j, const MatrixXd& shaken) {
     uncertainty::GyroRates gyro;
@@ -46,8 +66,7 @@ uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::D
     for (Index k = 0; k < n; ++k) {
         const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
         gyro.rate[k] = dwell.row.rate[j];
-        const double level = dwell.relative_error * shaken(k, g);
-        gyro.variance[k] = dwell.row.variance[j][j] + level * level;
+        gyro.variance[k] = variance_of(dwell, j, shaken(k, g));
     }
     gyro.regressors = table.grouped(j);
     gyro.prior_information = prior.array().square().inverse();
@@ -279,7 +298,6 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     std::array<GyroProblem, 3> problems;
     std::array<uncertainty::DriftAverage, 3> groups;
     std::array<MatrixXd, 3> if_flat, gains;
-    MatrixXd variance(3, n);  ///< of the dwells' rates, of noise
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -289,7 +307,6 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
             groups[j] = uncertainty::average_drift(gyro, settings.drift);
             const uncertainty::DriftAverage& average = groups[j];
-            variance.row(g) = gyro.variance.transpose();
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
@@ -317,17 +334,9 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
                                         : gain(table, j, problems[j], out.gyros[j].list.front());
-    out.noise.resize(3 * kBase);
-    for (Index j = 0; j < 3; ++j) {
-        const auto& g = gains[static_cast<std::size_t>(j)];
-        for (Index a = 0; a < kBase; ++a)
-            out.noise[3 * a + j] = std::sqrt(g.row(a).cwiseAbs2().dot(variance.row(j)));
-    }
+    out.noise = noise_of(table, gains, out.vibration_rates);
     const MatrixXd effect = add_effects(gains, declared, out);
-    if (form == Form::groups)
-        put_groups(groups, effect, out);
-    else
-        put_together(table, effect, out);
+    form == Form::groups ? put_groups(groups, effect, out) : put_together(table, effect, out);
     set_reach(settings, table, out);
     if (form == Form::flat && out.flat.alarm)
         out.model.refusal = "quadratic coefficients depend on the frequency, and are taken as flat";
