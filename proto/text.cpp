@@ -65,6 +65,17 @@ std::string printable(std::string_view text, std::size_t longest) {
     return out;
 }
 
+std::string mend_utf8(std::string_view text) {
+    std::string out;
+    out.reserve(text.size());
+    while (!text.empty()) {
+        const std::size_t length = sequence_length(text);
+        out += length == 0 ? std::string_view("?") : text.substr(0, length);
+        text.remove_prefix(std::max<std::size_t>(length, 1));
+    }
+    return out;
+}
+
 std::string_view without_byte_order_mark(std::string_view text) noexcept {
     return text.starts_with("\xef\xbb\xbf") ? text.substr(3) : text;
 }

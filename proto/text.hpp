@@ -14,6 +14,9 @@ inline constexpr std::size_t kQuotedLength = 40, kLongestLine = 1000;
 /// characters, line separators and those that turn the direction of writing are escaped, as \n,
 /// \x1b, \u202e; bytes that are not UTF-8 as \xff. At most `longest` bytes and "...".
 [[nodiscard]] std::string printable(std::string_view text, std::size_t longest = kQuotedLength);
+/// The same text with a '?' for each byte that is not UTF-8: it must not spoil a whole answer or
+/// page.
+[[nodiscard]] std::string mend_utf8(std::string_view text);
 [[nodiscard]] std::string_view without_byte_order_mark(std::string_view text) noexcept;
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;
 [[nodiscard]] std::string utf8_from_latin1(std::string_view text);

@@ -7,6 +7,7 @@
 #include "daemon/serve/status_message.hpp"
 #include "daemon/status/values.hpp"
 #include "proto/sparkplug.pb.h"
+#include "proto/text.hpp"
 
 namespace vibrig::fleet {
 namespace {
@@ -53,7 +54,7 @@ std::vector<Reading> readings_of(const StatusData& s) {
     }
     for (Reading& reading : readings) {
         if (auto* const text = std::get_if<std::string>(&reading.value))
-            *text = serve::mend_utf8(*text);
+            *text = proto::mend_utf8(*text);
     }
     return readings;
 }

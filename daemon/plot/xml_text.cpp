@@ -1,10 +1,12 @@
 #include "daemon/plot/xml_text.hpp"
 
+#include "proto/text.hpp"
+
 namespace vibrig::tool::plot {
 
 std::string xml_text(const std::string& text) {
     std::string out;
-    for (const char c : text) {
+    for (const char c : proto::mend_utf8(text)) {
         switch (c) {
             case '&':
                 out += "&amp;";

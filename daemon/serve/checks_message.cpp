@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "daemon/serve/status_message.hpp"
+#include "proto/text.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {
@@ -10,8 +11,8 @@ namespace {
 
 void fill_loop_check(v1::LoopCheck& out, const LoopCheckStatus& check) {
     out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
-    out.set_by(mend_utf8(check.by));
-    out.set_message(mend_utf8(check.message));
+    out.set_by(proto::mend_utf8(check.by));
+    out.set_message(proto::mend_utf8(check.message));
     for (const auto& row : check.rows) {
         v1::LoopCheck::Row& to = *out.add_rows();
         to.set_name(row.name);
@@ -25,25 +26,25 @@ void fill_loop_check(v1::LoopCheck& out, const LoopCheckStatus& check) {
 
 void fill_rest_check(v1::RestCheck& out, const RestCheckStatus& check) {
     out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
-    out.set_by(mend_utf8(check.by));
+    out.set_by(proto::mend_utf8(check.by));
     out.set_utc_ns(check.utc_ns);
-    out.set_message(mend_utf8(check.message));
-    for (const auto& suspect : check.suspects) out.add_suspects(mend_utf8(suspect));
+    out.set_message(proto::mend_utf8(check.message));
+    for (const auto& suspect : check.suspects) out.add_suspects(proto::mend_utf8(suspect));
 }
 
 void fill_proof(v1::Proof& out, const ProofStatus& proof) {
     out.set_demanded(proof.demanded);
-    out.set_refusal(mend_utf8(proof.refusal));
+    out.set_refusal(proto::mend_utf8(proof.refusal));
     out.set_advice(proof.advice);
-    out.set_by(mend_utf8(proof.by));
+    out.set_by(proto::mend_utf8(proof.by));
     out.set_utc_ns(proof.utc_ns);
     out.set_passed(proof.passed);
-    out.set_message(mend_utf8(proof.message));
+    out.set_message(proto::mend_utf8(proof.message));
     out.set_asks(proof.asks);
     for (const auto& row : proof.rows) {
         v1::LoopCheck::Row& to = *out.add_rows();
-        to.set_name(mend_utf8(row.name));
-        to.set_unit(mend_utf8(row.unit));
+        to.set_name(proto::mend_utf8(row.name));
+        to.set_unit(proto::mend_utf8(row.unit));
         if (std::isfinite(row.value)) to.set_value(row.value);
         if (std::isfinite(row.low)) to.set_low(row.low);
         if (std::isfinite(row.high)) to.set_high(row.high);
@@ -59,7 +60,7 @@ void fill_proof(v1::Proof& out, const ProofStatus& proof) {
     }
     out.set_keys_sha256(proof.keys_sha256);
     out.set_table_g(proof.table_g);
-    out.set_trend(mend_utf8(proof.trend));
+    out.set_trend(proto::mend_utf8(proof.trend));
 }
 
 }  // namespace

@@ -152,7 +152,7 @@ std::string readiness_json(const Readiness& readiness) {
         v1::Readiness::Check& to = *message.add_checks();
         to.set_name(check.name);
         to.set_passed(check.passed);
-        to.set_text(mend_utf8(check.text));
+        to.set_text(proto::mend_utf8(check.text));
     }
     return to_json(message);
 }
@@ -166,13 +166,13 @@ std::string event_json(const EventRecord& event) {
 std::string reply_json(const CommandReply& reply) {
     v1::CommandReply message;
     message.set_accepted(reply.accepted);
-    message.set_message(mend_utf8(reply.message));
+    message.set_message(proto::mend_utf8(reply.message));
     return to_json(message);
 }
 
 std::string configuration_json(const std::string& text) {
     v1::Configuration message;
-    message.set_text(mend_utf8(text));
+    message.set_text(proto::mend_utf8(text));
     return to_json(message);
 }
 
@@ -181,7 +181,7 @@ std::string problem_json(int status, const std::string& title, const std::string
     message.set_type("about:blank");
     message.set_title(title);
     message.set_status(status);
-    message.set_detail(mend_utf8(detail));
+    message.set_detail(proto::mend_utf8(detail));
     return to_json(message);
 }
 

@@ -10,6 +10,7 @@
 #include "drivers/sample/channels.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/identification/result.hpp"
+#include "proto/text.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {
@@ -59,22 +60,23 @@ void fill(v1::RealTime& out, const StatusData& status) {
         to.set_deadline_misses(thread.deadline_misses);
         to.set_longest_ms(thread.longest_ms);
     }
-    for (const std::string& what : status.real_time.missing) out.add_missing(mend_utf8(what));
+    for (const std::string& what : status.real_time.missing)
+        out.add_missing(proto::mend_utf8(what));
 }
 
 void fill(v1::Server& out, const ServerStatus& server, std::int64_t utc_ns) {
     for (const ServerStatus::Door& door : server.doors) {
         v1::Server::Door& to = *out.add_doors();
         to.set_name(door.name);
-        to.set_address(mend_utf8(door.address));
+        to.set_address(proto::mend_utf8(door.address));
         to.set_open(door.open);
-        to.set_note(mend_utf8(door.note));
+        to.set_note(proto::mend_utf8(door.note));
         to.set_made_anew(door.made_anew);
     }
     for (const CertificateStatus& certificate : server.certificates) {
         constexpr double kDay = 86'400;  // s
         v1::Server::Certificate& to = *out.add_certificates();
-        to.set_whose(mend_utf8(certificate.whose));
+        to.set_whose(proto::mend_utf8(certificate.whose));
         set_time(*to.mutable_expires(), certificate.expires * drivers::kSecond);
         to.set_days_left((static_cast<double>(certificate.expires) - drivers::to_seconds(utc_ns)) /
                          kDay);
@@ -90,16 +92,16 @@ void fill(v1::Interlock& out, const InterlockStatus& status) {
     out.set_tripped(status.tripped);
     for (const Latch& latch : status.latches) {
         v1::Interlock::Latch& to = *out.add_latches();
-        to.set_name(mend_utf8(latch.name));
-        to.set_cause(mend_utf8(latch.cause));
-        to.set_armed_by(mend_utf8(latch.armed_by));
+        to.set_name(proto::mend_utf8(latch.name));
+        to.set_cause(proto::mend_utf8(latch.cause));
+        to.set_armed_by(proto::mend_utf8(latch.armed_by));
         to.set_two_persons(latch.two_persons);
-        to.set_first(mend_utf8(latch.first));
+        to.set_first(proto::mend_utf8(latch.first));
         set_time(*to.mutable_utc(), latch.utc_ns);
     }
     for (const InterlockStatus::Row& row : status.rows) {
         v1::Interlock::Row& to = *out.add_rows();
-        to.set_name(mend_utf8(row.name));
+        to.set_name(proto::mend_utf8(row.name));
         to.set_condition(row.condition);
         to.set_reaction(row.reaction);
         if (row.has_limit) set(to, &v1::Interlock::Row::set_limit, row.limit);
@@ -236,7 +238,7 @@ void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
     set(out, &v1::Dwell::set_mean_force_g, dwell.mean_force_g);
     set(out, &v1::Dwell::set_nis_per_dof, dwell.nis_per_dof);
     out.set_flagged(dwell.flagged);
-    if (dwell.reason != nullptr) out.set_reason(mend_utf8(dwell.reason));
+    if (dwell.reason != nullptr) out.set_reason(proto::mend_utf8(dwell.reason));
 }
 
 }  // namespace
@@ -260,7 +262,7 @@ void set_field(google::protobuf::Message& out, const google::protobuf::FieldDesc
         case Field::CPPTYPE_DOUBLE:
             return to.SetDouble(&out, &field, std::get<double>(value));
         default:
-            return to.SetString(&out, &field, mend_utf8(std::get<std::string>(value)));
+            return to.SetString(&out, &field, proto::mend_utf8(std::get<std::string>(value)));
     }
 }
 
@@ -290,7 +292,7 @@ void fill(v1::Levelling& out, const LevellingStatus& levelling) {
     if (levelling.limit_arcmin > 0)
         set(out, &v1::Levelling::set_limit_arcmin, levelling.limit_arcmin);
     out.set_done(levelling.done);
-    out.set_message(mend_utf8(levelling.message));
+    out.set_message(proto::mend_utf8(levelling.message));
 }
 
 void fill(v1::Zeros& out, const ZeroStatus& zeros) {
@@ -313,8 +315,8 @@ void fill(v1::Zeros& out, const ZeroStatus& zeros) {
         out.add_change_mg(finite(change));
     for (const double sigma : zeros.repeated ? zeros.change_sigma_mg : std::array<double, 3>{})
         out.add_change_sigma_mg(finite(sigma));
-    out.set_mark(mend_utf8(zeros.mark));
-    out.set_message(mend_utf8(zeros.message));
+    out.set_mark(proto::mend_utf8(zeros.mark));
+    out.set_message(proto::mend_utf8(zeros.message));
 }
 
 void fill(v1::Campaign& out, const StatusData& status) {
@@ -397,7 +399,7 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
     for (const estimator::Combination& determined : result.combinations) {
         v1::Combination& combination = *out.add_combinations();
         for (const auto& [name, weight] : determined.weights) {
-            (*combination.mutable_weights())[mend_utf8(name)] = finite(weight);
+            (*combination.mutable_weights())[proto::mend_utf8(name)] = finite(weight);
         }
         set(combination, &v1::Combination::set_value, determined.value);
         set(combination, &v1::Combination::set_sigma, determined.sigma);
@@ -405,11 +407,11 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
     set(out, &v1::Parameters::set_nis, result.nis_per_dof);
     out.set_samples(result.samples);
     out.set_rejected(result.rejected);
-    for (const std::string& warning : result.warnings) out.add_warnings(mend_utf8(warning));
+    for (const std::string& warning : result.warnings) out.add_warnings(proto::mend_utf8(warning));
 }
 
 void fill(v1::Plan& out, const PlanData& plan) {
-    out.set_name(mend_utf8(plan.name));
+    out.set_name(proto::mend_utf8(plan.name));
     out.set_adaptive(plan.adaptive);
     out.set_dwell_s(plan.dwell_s);
     out.set_frequency_hz(plan.frequency_hz);
@@ -437,8 +439,8 @@ void fill(v1::Event& out, const EventRecord& event) {
     set_time(*out.mutable_utc(), event.utc_ns);
     out.set_time_s(drivers::to_seconds(event.time));
     out.set_severity(wire_enum<v1::Event::Severity>(event.severity));
-    out.set_source(mend_utf8(event.source));
-    out.set_text(mend_utf8(event.text));
+    out.set_source(proto::mend_utf8(event.source));
+    out.set_text(proto::mend_utf8(event.text));
 }
 
 }  // namespace vibrig::serve

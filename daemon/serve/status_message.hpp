@@ -36,8 +36,4 @@ void fill(v1::Verdict& out, const StatusData& status);
 void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);
 
-/// Bytes that are not UTF-8 become '?': a text from a device or a file must not spoil a whole
-/// answer.
-[[nodiscard]] std::string mend_utf8(std::string_view text);
-
 }  // namespace vibrig::serve

@@ -52,5 +52,16 @@ TEST(Printable, OfAnythingIsCleanAndStaysAsItIs) {
     }
 }
 
+TEST(MendUtf8, HasAMarkForEachByteThatIsNone) {
+    const std::string good = "caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x98\x80\n\t";
+    EXPECT_EQ(mend_utf8(good), good);
+    EXPECT_EQ(mend_utf8(""), "");
+    EXPECT_EQ(mend_utf8("\xFF"), "?");
+    EXPECT_EQ(mend_utf8("a\xC3"), "a?");               // cut off
+    EXPECT_EQ(mend_utf8("\xC0\xAF"), "??");            // overlong
+    EXPECT_EQ(mend_utf8("\xED\xA0\x80"), "???");       // surrogate
+    EXPECT_EQ(mend_utf8("\xF4\x90\x80\x80"), "????");  // beyond U+10FFFF
+}
+
 }  // namespace
 }  // namespace vibrig::proto
