@@ -6,7 +6,6 @@ own watchdog.
 usage: kills_campaign.py PROGRAMS [--soak] [--seed N]      20 kills; 200 with --soak
 """
 import glob
-import json
 import os
 import random
 import re

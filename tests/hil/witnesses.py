@@ -5,7 +5,6 @@ else than it reads back, an accelerometer that is stuck, wrong keys, a rig that 
 usage: witnesses.py PROGRAMS
 """
 import os
-import subprocess
 import sys
 import tempfile
 

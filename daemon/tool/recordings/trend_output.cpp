@@ -87,7 +87,7 @@ Json trend_json(const std::string& serial, const archive::Trend& trend, double s
                                 {"points", std::move(points)}});
     }
     const std::string type = trend.campaigns.empty() ? "" : trend.campaigns.back().unit_type;
-    return {{"unit", {{"type", type}, {"serial", serial}}},
+    return {{"unit", {{"type", text_or_null(type)}, {"serial", serial}}},
             {"shutdown_after_h", shutdown_after_h},
             {"campaigns", std::move(campaigns)},
             {"left_out", trend.left_out},
