@@ -222,6 +222,7 @@ bool Journal::write(const std::deque<Entry>& entries) {
             std::visit([this](const auto& one) { write_one(one); }, entry);
         }
         file_.commit();
+        watch_.wrote(file_.newest());
         for (const Entry& entry : entries) {
             if (const auto* safety = std::get_if<Safety>(&entry)) follow(*safety);
             if (std::holds_alternative<Proved>(entry))
@@ -248,7 +249,7 @@ bool Journal::write(const std::deque<Entry>& entries) {
 /// behind.
 void Journal::publish() {
     const auto why = file_.publish();
-    watch_.wrote(file_.newest(), why.empty() ? file_.newest() : Link{});
+    watch_.published(why.empty() ? file_.newest() : Link{});
     if (why.empty()) return;
     const std::lock_guard lock(mutex_);
     status_.note = "its signed head: " + why;

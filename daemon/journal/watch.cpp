@@ -53,10 +53,14 @@ void Watch::stop() noexcept {
     if (thread_.joinable()) thread_.join();
 }
 
-void Watch::wrote(const Link& newest, const Link& published) {
+void Watch::wrote(const Link& newest) {
     const std::lock_guard lock(mutex_);
     expected_.newest = newest;
-    published_ = published;
+}
+
+void Watch::published(const Link& head) {
+    const std::lock_guard lock(mutex_);
+    published_ = head;
 }
 
 void Watch::changed_by_others() {

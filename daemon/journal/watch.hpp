@@ -44,8 +44,10 @@ class Watch {
     void begin(Expected expected);
     void start();
     void stop() noexcept;
-    /// Is on disk; and its head, up to `published`, beside it.
-    void wrote(const Link& newest, const Link& published);
+    /// Is on disk. Before anybody is told so: what is cut off then is missed.
+    void wrote(const Link& newest);
+    /// The head of this entry lies beside it; of none: it could not be written.
+    void published(const Link& head);
     void changed_by_others();
 
     struct Report {
