@@ -198,6 +198,13 @@ Assessed assess(const estimator::Settings& settings, const std::optional<noise::
     const auto in_force = dwells::Anew::settings_of(settings, found);
     out.spectrum = spectrum_of(in_force, rows, std::move(shaken), form);
     if (out.spectrum) adopt(*out.spectrum, in_force, out.assessed);
+    const bool others = std::ranges::any_of(
+        rows, [](const estimator::DwellRow& row) { return row.apart && !row.held_out; });
+    if (others && rows.size() > kMostSpectralDwells)
+        doubt(out.assessed.verdict, "there are no coefficients over frequency of " +
+                                        std::to_string(rows.size()) + " dwells (" +
+                                        std::to_string(kMostSpectralDwells) +
+                                        " at most): those at the reference frequency stand");
     return out;
 }
 

@@ -1,0 +1,99 @@
+#include "daemon/results/spectrum_result.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/estimator/spectrum/survey.hpp"
+
+namespace vibrig::tool {
+namespace {
+
+using namespace estimator::spectrum::testing;
+using estimator::DwellRow;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Rows as a campaign has them: at rest and at 15 Hz its own, the others apart.
+std::vector<DwellRow> rows_of(const Truth& truth, std::size_t surveys) {
+    std::vector<PlannedDwell> plan;
+    for (std::size_t i = 0; i < surveys; ++i)
+        for (const PlannedDwell& one : survey()) plan.push_back(one);
+    std::mt19937_64 random(3);
+    Dwells dwells = dwells_of(gain_declared(), truth, plan);
+    add_noise(dwells, random);
+    std::vector<DwellRow> rows;
+    for (std::size_t i = 0; i < plan.size(); ++i) {
+        rows.push_back(dwells.list[i].row);
+        rows.back().commanded_hz = plan[i].hz;
+        rows.back().apart = plan[i].hz > 15;
+    }
+    return rows;
+}
+
+Assessed assessed(const std::vector<DwellRow>& rows) {
+    estimator::Settings settings = gain_declared();
+    settings.frequency_hz = 15;
+    estimator::Result result;
+    result.rows = estimator::without_apart(rows);
+    result.observable.fill(true);
+    return assess(settings, {}, result, rows, {});
+}
+
+/// Largest distance from the static coefficients of the rig, in u.
+double worst(const Assessed& found) {
+    const auto truth = table2();
+    double out = 0;
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto& c = found.assessed.coefficients[i];
+        out = std::max(out, std::abs(c.value - truth[estimator::internal_of(i)]) / c.u);
+    }
+    return out;
+}
+
+std::string words_of(const Assessed& found) {
+    std::string words;
+    for (const auto& reason : found.assessed.verdict.reasons) words += reason.text + "; ";
+    return words;
+}
+
+TEST(AssessOverFrequency, ACampaignHasTheStaticCoefficientsOfARigThatResonates) {
+    const Truth truth = Truth::common(0.5, kSixty);
+    // GIVEN all frequencies, or the first one alone
+    const std::vector<DwellRow> rows = rows_of(truth, 1);
+    const Assessed all = assessed(rows), one = assessed(estimator::without_apart(rows));
+    ASSERT_TRUE(all.spectrum && all.assessed.over_frequency);
+    EXPECT_FALSE(one.spectrum || one.assessed.over_frequency);
+    // THEN the first has the rig's (30 values, one rig: 4 u is 1 in 500), and the other has not:
+    // at 15 Hz elastic halves are 6.6 % more
+    EXPECT_LT(worst(all), 4);
+    EXPECT_EQ(all.spectrum->at_hz(4), 0) << "static";
+    EXPECT_EQ(all.spectrum->at_hz(0), 0) << "a bias knows no frequency";
+    // AND the parts of each U are of that fit
+    for (const auto& c : all.assessed.coefficients) {
+        double square = 0;
+        for (const auto& part : c.budget) square += part.contribution * part.contribution;
+        EXPECT_NEAR(square / (c.u * c.u), 1, 1e-9);
+        EXPECT_LE(c.noise, c.u_a);
+        EXPECT_NEAR(c.expanded, c.k * c.u, 1e-12);
+    }
+    EXPECT_EQ(all.assessed.rates.size(), rows.size());
+    EXPECT_NE(all.assessed.coefficients[4].value, one.assessed.coefficients[4].value);
+}
+
+TEST(AssessOverFrequency, MoreDwellsThanItTakesAreSaid) {
+    // GIVEN 441 dwells at seven frequencies
+    const std::vector<DwellRow> rows = rows_of({}, 7);
+    ASSERT_GT(rows.size(), kMostSpectralDwells);
+    const Assessed found = assessed(rows);
+    // THEN nobody takes what stands for coefficients over frequency
+    EXPECT_FALSE(found.spectrum);
+    EXPECT_THAT(words_of(found), HasSubstr("of 441 dwells (400 at most)"));
+    // AND of as many at one frequency nothing is said
+    const Assessed one = assessed(estimator::without_apart(rows_of({}, 40)));
+    EXPECT_THAT(words_of(one), Not(HasSubstr("at most")));
+}
+
+}  // namespace
+}  // namespace vibrig::tool
