@@ -6,6 +6,7 @@ usage: survey_campaign.py PROGRAMS [--soak]
 """
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -134,6 +135,11 @@ def whoever_reads_it(checks, programs, rig, result, page):
     checks.equal([p["name"] for p in result["parameters"] if f"<td>{p['value']:.6f}</td><td>{p['expanded']:.6f}</td>" not in text], [],
                  "the report has each value with its U")
     checks.check("Of the dwells at rest and at 15.1 Hz alone" in text, "and says of which dwells the filter's are", text[:500])
+    section = text[text.index('id="coefficients"'):]
+    cells = [re.findall("<td[^>]*>([^<]*)</td>", row) for row in re.findall("<tr>(.*?)</tr>", section[:section.index("</table>")])]
+    found = [float(row[7]) for row in cells if len(row) == 9]
+    # What the bound of those dwells allows, the filter reaches; of all dwells it would be smaller.
+    checks.check(len(found) == 30 and all(0.97 < efficiency < 1.03 for efficiency in found), "whose bound the filter reaches", str(found))
     run = vibrig(programs, "compensate", recorded, "--json")
     said = json.loads(run.stdout) if run.stdout else {}
     checks.equal([[c["value"], c["sigma"]] for c in said.get("coefficients", [])], [[p["value"], p["u"]] for p in result["parameters"]],
