@@ -54,9 +54,9 @@ void ControlLoop::take_commands(Time now) {
                 acknowledging_.push_back({std::move(waiting), std::move(reply),
                                           entry_of_acknowledgement_, rt::steady_now()});
         } else {
-            const auto guarded = outside_.refuses(waiting.request);
-            answer(waiting, guarded.empty() ? campaign_.command(waiting.request, now)
-                                            : CommandReply{false, guarded});
+            const auto unfit = not_fit_to_shake(waiting.request);
+            answer(waiting, unfit.empty() ? campaign_.command(waiting.request, now)
+                                          : CommandReply{false, unfit});
         }
     }
 }
@@ -98,6 +98,15 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
     if (journal_ || rig_clock_) return {};
     return "no journal is kept, found campaign.results and journal.file empty: a trip would be "
            "forgotten by a restart";
+}
+
+/// Of an armed rig: what may have come since.
+std::string ControlLoop::not_fit_to_shake(const CommandRequest& request) const {
+    if (auto why = outside_.refuses(request); !why.empty()) return why;
+    if (request.kind != CommandRequest::Kind::start && request.kind != CommandRequest::Kind::resume)
+        return {};
+    const Latch* const changed = latches_.find(journal::kJournalLatch);
+    return changed == nullptr ? std::string() : changed->cause + kJournalToDo;
 }
 
 /// Until all of it was looked at nobody knows what it says of trips and proofs.
@@ -151,8 +160,10 @@ void ControlLoop::finish_arming(Time now) {
     }
     Arming arming = std::move(*arming_);
     arming_.reset();
-    // Whatever has happened since it was asked.
-    auto reply = campaign_.command(arming.waiting.request, now);
+    // Whatever has happened since it was asked: a journal that was lost by this very writing, too.
+    const auto unfit = not_fit_to_arm(arming.waiting.request, now);
+    auto reply =
+        unfit.empty() ? campaign_.command(arming.waiting.request, now) : CommandReply{false, unfit};
     if (reply.accepted) {
         if (arming.waiting.request.kind == CommandRequest::Kind::arm)
             reply.message += tell_overdue();
@@ -237,7 +248,8 @@ void ControlLoop::watch_emergency_stop(Time now) {
     emergency_was_open_ = open;
     const char* const name = rt::condition_of(rt::Trip::emergency_stop).name;
     if (!open || at_start || latches_.find(name) != nullptr) return;
-    if (!tripped && !configuration_.campaign.second_person) return;
+    // What was aborted a moment ago is still to come to rest.
+    if (!tripped && !configuration_.campaign.second_person && !campaign_.stopping()) return;
     std::string armed_by = campaign_.armed_by();
     for (const Latch& latch : latches_.open())
         if (armed_by.empty()) armed_by = latch.armed_by;
@@ -284,7 +296,6 @@ std::string ControlLoop::unknown_to_acknowledge(const CommandRequest& request) c
 }
 
 CommandReply ControlLoop::acknowledge(const CommandRequest& request, Time now) {
-    const rt::Tripped handled = interlock_.latched();
     if (const auto alarm = acknowledge_alarm(request); alarm.accepted) return alarm;
     if (const auto unknown = unknown_to_acknowledge(request); !unknown.empty())
         return {false, unknown};
@@ -315,7 +326,7 @@ CommandReply ControlLoop::acknowledge(const CommandRequest& request, Time now) {
         // First what would trip it again.
         outside_.acknowledge();
         watch_outside();
-        interlock_.acknowledge(handled);
+        interlock_.acknowledge(handled_);
     }
     return reply;
 }

@@ -11,7 +11,6 @@ namespace vibrig {
 using drivers::Time;
 
 void ControlLoop::run() {
-    rt::Tripped handled;
     bool done = false;
     Time next = 0;  // of the campaign
     while (!give_up_.load()) {
@@ -27,9 +26,9 @@ void ControlLoop::run() {
         };
         parts_.port_events.consume(words);
         parts_.shaker_events.consume(words);
-        if (const rt::Tripped trip = interlock_.latched(); !(trip == handled)) {
+        if (const rt::Tripped trip = interlock_.latched(); !(trip == handled_)) {
             if (trip) on_trip(trip, now);
-            handled = trip;
+            handled_ = trip;
         }
         if (first_reading_known_.load() && !std::exchange(first_reading_judged_, true))
             judge_first_reading(now);
@@ -77,11 +76,11 @@ void ControlLoop::show(Time now) {
     if (commissioning_.active()) status_.reason = commissioning_.progress();
     status_.interlock.latches = latches_.open();
     status_.noise = dwells_.noise();
-    outside_.armed(!status_.armed_by.empty(), highest_level());
+    outside_.armed(!campaign_.armed_by().empty(), highest_level());
 }
 
 double ControlLoop::highest_level() const {
-    if (status_.armed_by.empty()) return 0;
+    if (campaign_.armed_by().empty()) return 0;
     const auto& campaign = configuration_.campaign;
     if (status_.state == CampaignState::checking) return campaign.loop.table_g;
     return campaign.table_g.empty() ? 0 : *std::ranges::max_element(campaign.table_g);

@@ -87,6 +87,7 @@ class ControlLoop {
     [[nodiscard]] bool first_shaking() const;
     void watch_arming();
     void end_arming(const std::string& why);
+    [[nodiscard]] std::string not_fit_to_shake(const CommandRequest& request) const;
     [[nodiscard]] std::string journal_being_verified() const;
     [[nodiscard]] std::string not_fit_to_arm(const CommandRequest& request,
                                              drivers::Time now) const;
@@ -190,6 +191,7 @@ class ControlLoop {
     std::vector<Acknowledging> certifying_;       ///< certificates that are not answered yet
     std::uint64_t entry_of_acknowledgement_ = 0;  ///< the newest; 0: none
     std::string armed_by_;                        ///< as last looked at
+    rt::Tripped handled_;                         ///< the interlock's, as it was reported
     drivers::ShakerReading first_reading_;
     std::atomic<bool> first_reading_known_{false};
     bool first_reading_judged_ = false;

@@ -141,12 +141,11 @@ void Daemon::start_recording() {
 }
 
 void Daemon::watch_shaker() {
-    parts_.shaker->on_reading([this] {
-        const auto reading = parts_.shaker->reading();
+    parts_.shaker->on_judging([this](const drivers::ShakerReading& reading) {
         control_.first_reading(reading);
         parts_.interlock.check(reading);
-        parts_.control_waiter->notify();
     });
+    parts_.shaker->on_reading([this] { parts_.control_waiter->notify(); });
     parts_.shaker->on_stop_written([this] { parts_.interlock.stop_written(); });
 }
 

@@ -28,7 +28,8 @@ void Outside::armed(bool by_somebody, double highest_g) noexcept {
 }
 
 void Outside::acknowledge() {
-    if (guard_link_) guard_link_->acknowledge(guard_link_->word().finding);
+    // What somebody could know of: a newer one is reported first.
+    if (guard_link_) guard_link_->acknowledge(guard_finding_);
 }
 
 void Outside::fill(StatusData& status) const {

@@ -223,10 +223,10 @@ bool Journal::write(const std::deque<Entry>& entries) {
         }
         file_.commit();
         watch_.wrote(file_.newest());
+        // It is on disk: nothing after this may take it back.
         for (const Entry& entry : entries) {
             if (const auto* safety = std::get_if<Safety>(&entry)) follow(*safety);
-            if (std::holds_alternative<Proved>(entry))
-                note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+            if (std::holds_alternative<Proved>(entry)) note_newest_proof();
         }
     } catch (const DatabaseError& error) {
         why = error.what();
@@ -238,7 +238,13 @@ bool Journal::write(const std::deque<Entry>& entries) {
         const std::lock_guard lock(mutex_);
         status_.running = why.empty();
         status_.note = why;
-        if (why.empty()) status_.written += entries.size();
+        if (why.empty()) {
+            // With the head that goes with it: who closes a recording asks for both.
+            status_.written += entries.size();
+            status_.head = file_.head().line();
+            status_.proof_head = proof_head_;
+            status_.entries = static_cast<std::uint64_t>(file_.newest().entry);
+        }
     }
     if (on_written_) on_written_();
     if (why.empty()) publish();
@@ -249,8 +255,8 @@ bool Journal::write(const std::deque<Entry>& entries) {
 /// behind.
 void Journal::publish() {
     const auto why = file_.publish();
-    watch_.published(why.empty() ? file_.newest() : Link{});
-    if (why.empty()) return;
+    // Where it cannot be written the one before still lies there.
+    if (why.empty()) return watch_.published(file_.newest());
     const std::lock_guard lock(mutex_);
     status_.note = "its signed head: " + why;
 }

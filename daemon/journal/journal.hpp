@@ -159,6 +159,8 @@ class Journal {
     void read_safety(Database& from);
     void follow(const Safety& safety);
     void note_proof(std::int64_t row);
+    /// Where it cannot be read there is none.
+    void note_newest_proof() noexcept;
     void look();
     [[nodiscard]] std::string cause_of(const DatabaseError& error) const;
     void begin_anew(const std::vector<std::string>& found);

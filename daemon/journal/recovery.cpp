@@ -71,6 +71,14 @@ void Journal::note_proof(std::int64_t row) {
     proof_head_ = head ? head->line() : "";
 }
 
+void Journal::note_newest_proof() noexcept {
+    try {
+        note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+    } catch (const std::exception&) {
+        proof_head_.clear();
+    }
+}
+
 void Journal::follow(const Safety& safety) {
     const std::string_view what = safety.what;
     if (what == kArmed) {

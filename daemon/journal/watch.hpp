@@ -46,7 +46,7 @@ class Watch {
     void stop() noexcept;
     /// Is on disk. Before anybody is told so: what is cut off then is missed.
     void wrote(const Link& newest);
-    /// The head of this entry lies beside it; of none: it could not be written.
+    /// The head of this entry lies beside it.
     void published(const Link& head);
     void changed_by_others();
 

@@ -539,16 +539,15 @@ void ModbusShaker::poll(Time now) {
     ShakerReading reading = image_.reading(now);
     reading.watchdog = timeout_seen_;
     reading.watchdog_timeout_s = timeout_read_s_;
-    if (const auto changed = changed_by_others(reading); !changed.empty()) {
+    const auto changed = changed_by_others(reading);
+    if (!changed.empty()) {
         ++counts_.read_back_mismatches;
         write_failed_ = true;
         commanded_.reset();  // reported once
-        latest_.store(reading);
-        settle(changed);
-    } else {
-        latest_.store(reading);
-        settle("read back");
     }
+    if (on_judging_) on_judging_(reading);
+    latest_.store(reading);
+    settle(changed.empty() ? "read back" : changed);
     if (on_reading_) on_reading_();
 }
 

@@ -39,6 +39,9 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] ShakerCounters counters() const noexcept override;
     [[nodiscard]] LinkState state() const noexcept override { return state_.load(); }
     void on_reading(std::function<void()> wake) override { on_reading_ = std::move(wake); }
+    void on_judging(std::function<void(const ShakerReading&)> judge) override {
+        on_judging_ = std::move(judge);
+    }
     void on_stop_written(std::function<void()> confirmed) override {
         on_stop_written_ = std::move(confirmed);
     }
@@ -134,6 +137,7 @@ class ModbusShaker final : public Shaker {
     std::function<bool()> may_feed_;
     StateHandler on_state_;
     std::function<void()> on_reading_, on_stop_written_;
+    std::function<void(const ShakerReading&)> on_judging_;
     std::unique_ptr<Waiter> waiter_;
     // Whoever wakes the thread counts itself in, so that the waiter is not destroyed under it.
     std::atomic<Waiter*> wakeable_{nullptr};

@@ -219,6 +219,9 @@ class Shaker {
     /// Called in the shaker's thread after every completed read-back, to wake whoever waits for
     /// one. Before start().
     virtual void on_reading(std::function<void()> wake) = 0;
+    /// Called in the shaker's thread with every completed read-back, before reading() has it:
+    /// whoever acts on a reading finds it judged. Before start().
+    virtual void on_judging(std::function<void(const ShakerReading&)> /*judge*/) {}
     /// Rounds of the shaker's thread so far: it lives as long as they grow.
     [[nodiscard]] virtual std::uint64_t beats() const noexcept { return 0; }
     /// Called in the shaker's thread when the device has confirmed a stop. Before start().

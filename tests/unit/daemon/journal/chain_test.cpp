@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -506,6 +507,26 @@ TEST_F(ChainTest, NoticesWhileItRuns) {
         EXPECT_THAT(names, testing::UnorderedElementsAre("tilt", kJournalLatch, kDiedArmed))
             << c.what;
     }
+}
+
+/// Who closes a recording takes the head that is shown.
+TEST_F(ChainTest, WhatIsSaidToBeWrittenIsBelowTheHeadThatIsShown) {
+    Journal journal(path, kRig);
+    std::atomic<int> looks{0}, short_of_it{0};
+    journal.on_written([&] {
+        const auto status = journal.status();
+        const auto head = parse_head(status.head);
+        // An entry for each, behind that of the file's origin.
+        if (!head || head->link.entry <= static_cast<std::int64_t>(status.written)) ++short_of_it;
+        ++looks;
+    });
+    journal.start();
+    for (int i = 0; i < 20; ++i) {
+        journal.event({1, 1, 1, Severity::info, "rig", "one at a time"});
+        ASSERT_TRUE(eventually([&] { return looks > i; }));
+    }
+    journal.stop();
+    EXPECT_EQ(short_of_it, 0);
 }
 
 TEST_F(ChainTest, IsNotVerifiedFromAWriteByAnotherUntilAllOfItWasLookedAt) {

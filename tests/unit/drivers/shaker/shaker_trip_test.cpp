@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <thread>
 
 #include "test_bench.hpp"
 
@@ -46,6 +47,36 @@ TEST(ShakerTrip, RampZeroAndRunZeroAreOneWriteWhereTheyLieSideBySide) {
     // AND the next set-point brings its own ramp
     ASSERT_TRUE(bench.apply({15.0, 1.0, 2.0}));
     EXPECT_EQ(server.holding(kRampTime), 200);
+}
+
+/// Else whoever acts on a reading does so before the interlock has seen it: an opened emergency
+/// stop was an abort then, and no trip.
+TEST(ShakerTrip, AReadingIsJudgedBeforeAnybodyActsOnIt) {
+    TestServer server;
+    RealClock clock;
+    const auto shaker = make_shaker(clock, settings_for(server));
+    std::atomic<int> judged{0}, early{0};
+    std::atomic<Time> newest{0}, before{0};
+    shaker->on_judging([&](const ShakerReading& reading) {
+        if (shaker->reading().time >= reading.time) ++early;
+        newest = reading.time;
+        ++judged;
+    });
+    shaker->on_reading([&] {
+        if (shaker->reading().time != newest.load()) before = newest.load();
+    });
+    // AND whoever hears of the link's state finds no reading that was not judged
+    shaker->start([] { return true; },
+                  [&](LinkState, const char*) {
+                      if (shaker->reading().time > newest.load()) ++early;
+                  });
+    const auto deadline = steady_clock::now() + std::chrono::seconds(10);
+    while (judged < 5 && steady_clock::now() < deadline)
+        std::this_thread::sleep_for(milliseconds(2));
+    shaker->shut_down();
+    EXPECT_GE(judged, 5);
+    EXPECT_EQ(early, 0);
+    EXPECT_EQ(before, 0) << "and then it is the one that was";
 }
 
 TEST(ShakerTrip, APlannedEndKeepsItsRamp) {
