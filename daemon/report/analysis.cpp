@@ -95,12 +95,6 @@ Line fit(const std::vector<estimator::AngleBlock>& blocks, const std::vector<dou
     return {ty / tt, noise / std::sqrt(tt)};
 }
 
-/// The coefficients at the reference frequency do not rest on it.
-bool apart(const estimator::Settings& settings, const record::Order& order) {
-    return order.held_out || order.random.mean_square_g2 > 0 || order.sweep.any() ||
-           (order.frequency_hz > 0 && !estimator::at_reference(settings, order.frequency_hz));
-}
-
 /// Coefficients from all positions but those of one fold.
 Coefficients without(const Campaign& campaign, const estimator::Settings& settings,
                      const std::vector<RecordedDwell>& dwells, const std::set<int>& left_out) {
@@ -280,6 +274,11 @@ void expect(const Campaign& campaign, const std::vector<RecordedDwell>& dwells, 
 
 }  // namespace
 
+bool apart(const estimator::Settings& settings, const record::Order& order) {
+    return order.held_out || order.random.mean_square_g2 > 0 || order.sweep.any() ||
+           (order.frequency_hz > 0 && !estimator::at_reference(settings, order.frequency_hz));
+}
+
 double origin_s(const Campaign& campaign) {
     return campaign.samples.empty() ? 0 : drivers::to_seconds(campaign.samples.front().time);
 }
@@ -322,7 +321,7 @@ Analysis analyse(const Campaign& campaign, const configuration::Configuration& r
     auto whole = tool::assess(settings, out.replayed.found, out.replayed.result, out.replayed.rows,
                               record::shaken_of(campaign, rig));
     out.assessed = std::move(whole.assessed);
-    if (whole.spectrum) out.reference_hz = whole.spectrum->reference_hz;
+    if (whole.spectrum) out.reference_hz = settings.frequency_hz;
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

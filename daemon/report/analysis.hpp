@@ -61,6 +61,8 @@ using Progress = std::function<void(double fraction)>;
 [[nodiscard]] Analysis analyse(const record::Campaign& campaign,
                                const configuration::Configuration& rig, const Progress& progress);
 
+/// The coefficients at the reference frequency do not rest on such a dwell.
+[[nodiscard]] bool apart(const estimator::Settings& settings, const record::Order& order);
 /// Of its first sample, on the daemon's clock; 0: there is none.
 [[nodiscard]] double origin_s(const record::Campaign& campaign);
 /// The same of a recording that is not replayed.

@@ -77,9 +77,28 @@ Json coefficients_of(const Campaign& campaign, const Json& result) {
                         {"u", finite(p, "u", who)},
                         {"k", finite(p, "k", who)},
                         {"expanded", expanded},
-                        {"unit", p.value("unit", "")}});
+                        {"unit", p.value("unit", "")},
+                        {"at_hz", p.value("at_hz", Json())}});
     }
     return rows;
+}
+
+/// What the vibration was besides one frequency; null: nothing.
+Json frequencies_of(const Json& result) {
+    const auto found = result.find("spectrum");
+    if (found == result.end() || !found->is_object()) return nullptr;
+    const bool same = found->value("model", "") == "flat" &&
+                      found->value("refusal", Json()).is_null() &&
+                      !(found->value("flat", Json::object()).is_object() &&
+                        found->value("flat", Json::object()).value("alarm", false));
+    return {
+        {"words", same ? "The dwells shook with several frequencies; quadratic coefficients that "
+                         "depend on them were not found."
+                       : "The dwells shook with several frequencies, and quadratic coefficients "
+                         "depend on them: those given are static, or of the frequency named. They "
+                         "alone do not give the drift under a vibration."},
+        {"model", found->value("model", Json())},
+        {"highest_hz", found->value("highest_hz", Json())}};
 }
 
 Json statements_of(const Json& coefficients, const Issue& issue) {
@@ -218,6 +237,7 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     root["performed_by"] = campaign.head.started_by;
     root["issued_by"] = issue.by;
     root["method"] = kMethod;
+    root["frequencies"] = frequencies_of(result);
     root["deviations"] = deviations_of(replayed);
     root["equation"] = kDriftModel;
     root["conditions"] = conditions_of(campaign);

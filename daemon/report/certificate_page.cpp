@@ -46,6 +46,14 @@ void add_who(Page& page, const Json& c) {
                "words");
 }
 
+/// Of which vibration a coefficient is: bias and linear terms are of any.
+std::string vibration_of(const Json& result) {
+    const Json hz = result.value("at_hz", Json());
+    if (result.value("unit", "") != "deg/h/g^2") return "any";
+    if (!hz.is_number()) return "not stated";
+    return hz == 0 ? "static" : number_or(hz, "") + " Hz";
+}
+
 void add_results(Page& page, const Json& c) {
     page.section("results", "Results");
     const auto& verdict = c["verdict"];
@@ -55,14 +63,18 @@ void add_results(Page& page, const Json& c) {
             page.paragraph("- " + reason.value("text", ""));
     }
     if (!c.value("mark", "").empty()) page.paragraph("Marked: " + c.value("mark", ""));
+    const bool over_frequency = !c["frequencies"].is_null();
     Rows rows{{"coefficient", "value", "U", "k", "unit"}};
+    if (over_frequency) rows[0].emplace_back("vibration");
     for (const auto& r : c["results"]) {
         const double expanded = r["expanded"];
         const int digits = digits_of(expanded);
         rows.push_back({r["name"], fixed(r["value"], digits), fixed(expanded, digits),
                         fixed(r["k"], 2), r["unit"]});
+        if (over_frequency) rows.back().push_back(vibration_of(r));
     }
     page.table(rows);
+    if (over_frequency) page.paragraph(c["frequencies"].value("words", ""));
     page.paragraph(c["coverage"]);
 }
 

@@ -41,6 +41,7 @@ PlanFigures plan_figures(const Campaign& campaign, const Analysis& analysis) {
     std::map<double, std::pair<double, double>> sums;
     const std::size_t count = std::min(dwells.size(), analysis.replayed.dwells.size());
     for (std::size_t d = 0; d < count; ++d) {
+        if (apart(analysis.settings, *dwells[d].order)) continue;
         auto& [sum, n] = sums[dwells[d].order->table_g];
         sum += analysis.replayed.dwells[d].summary.amplitude_g;
         n += 1;
@@ -52,7 +53,7 @@ PlanFigures plan_figures(const Campaign& campaign, const Analysis& analysis) {
     planning::Effort effort;
     std::set<std::array<long, 3>> directions;
     for (std::size_t d = 0; d < count; ++d) {
-        if (dwells[d].count == 0) continue;
+        if (dwells[d].count == 0 || apart(analysis.settings, *dwells[d].order)) continue;
         const auto position = position_of(campaign, dwells[d]);
         // As a recording may lie: a dwell that is nowhere is none of the plan.
         if (!std::ranges::all_of(position, [](double angle) { return std::isfinite(angle); }))

@@ -296,7 +296,9 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
                            unit_text(unit) + ".");
         if (a.reference_hz > 0)
             page.paragraph(
-                fmt::format("Compared are those of rest and of {:g} Hz.", a.reference_hz));
+                fmt::format("Compared are the filter's, of rest and of {:g} Hz, with those of the "
+                            "earlier campaign's own vibration.frequency_hz.",
+                            a.reference_hz));
         Rows rows{{"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
         double square = 0;
         std::size_t count = 0, apart = 0;

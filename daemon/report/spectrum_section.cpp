@@ -287,8 +287,8 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
                       "nothing is known",
                       shown(spectrum.at("highest_hz"), "{:g}"));
         page.paragraph(fmt::format(
-            "The dwells shook with {}. The coefficients above are those at the reference "
-            "frequency; the result has {}. Of other frequencies {}.",
+            "The dwells shook with {}. The coefficients of section Coefficients are those at the "
+            "reference frequency; the result has {}. Of other frequencies {}.",
             with,
             resonates ? "static quadratic coefficients and an elastic part" : "them as they are",
             reach));

@@ -56,7 +56,7 @@ Json fit(const Assessment& a) {
             {"dof", a.degrees},
             {"p", number_or_null(a.p)},
             {"ramp_chi_square", number_or_null(a.ramps.chi_square)},
-            {"ramp_dof", 3 * a.rates.size()},
+            {"ramp_dof", a.ramps.degrees},
             {"birge", number_or_null(a.birge)},
             {"widening", number_or_null(a.widening)},
             {"worst_step", number_or_null(a.worst_step)},
@@ -135,10 +135,15 @@ Json freed(const Assessment& a) {
 }  // namespace
 
 Json coefficient_json(const Coefficient& c) {
-    return {{"u_a", number_or_null(c.u_a)},     {"u_b", number_or_null(c.u_b)},
-            {"u", number_or_null(c.u)},         {"nu_eff", number_or_null(c.nu_eff)},
-            {"k", number_or_null(c.k)},         {"expanded", number_or_null(c.expanded)},
-            {"u_use", number_or_null(c.u_use)}, {"budget", budget(c.budget)}};
+    return {{"noise", number_or_null(c.noise)},
+            {"u_a", number_or_null(c.u_a)},
+            {"u_b", number_or_null(c.u_b)},
+            {"u", number_or_null(c.u)},
+            {"nu_eff", number_or_null(c.nu_eff)},
+            {"k", number_or_null(c.k)},
+            {"expanded", number_or_null(c.expanded)},
+            {"u_use", number_or_null(c.u_use)},
+            {"budget", budget(c.budget)}};
 }
 
 Json assessment_json(const Assessment& a) {

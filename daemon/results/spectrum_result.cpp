@@ -10,6 +10,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/uncertainty/coverage.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::tool {
 
@@ -44,7 +45,9 @@ std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
         rate.time_h = times.time_h[static_cast<Index>(k)];
         for (std::size_t j = 0; j < 3; ++j) {
             rate.rate[j] = row.rate[j];
-            rate.sigma[j] = rate.residual_sigma[j] = std::sqrt(row.variance[j][j]);
+            rate.sigma[j] = std::sqrt(row.variance[j][j]);
+            rate.residual_sigma[j] =
+                of.analysis.rate_sigma(static_cast<Index>(k), static_cast<Index>(j));
             rate.residual[j] = row.rate[j] - model[j][static_cast<Index>(k)];
         }
         list.push_back(rate);
@@ -98,12 +101,31 @@ void tell_coefficients(const SpectrumResult& spectrum, const uncertainty::Inputs
     }
 }
 
-void doubt(uncertainty::Verdict& verdict, const std::string& text) {
-    using uncertainty::Level;
-    verdict.reasons.push_back({"spectrum", text, Level::doubtful});
-    if (verdict.level != Level::valid) return;
-    verdict.level = Level::doubtful;
-    verdict.sentence = "doubtful, because " + text;
+void doubt(uncertainty::Assessment& assessed, const std::string& text,
+           uncertainty::Level level = uncertainty::Level::doubtful) {
+    assessed.verdict.reasons.push_back({"spectrum", text, level});
+    uncertainty::conclude(assessed, assessed.verdict);
+}
+
+/// Number, from 1, that a dwell of the reference frequency has among all of them.
+int among_all(int number, const std::vector<uncertainty::DwellRate>& own,
+              const std::vector<uncertainty::DwellRate>& all) {
+    if (number < 1 || static_cast<std::size_t>(number) > own.size()) return number;
+    const uncertainty::DwellRate& one = own[static_cast<std::size_t>(number) - 1];
+    const auto at = std::ranges::find_if(all, [&one](const uncertainty::DwellRate& other) {
+        return other.run == one.run && other.position == one.position && other.rate == one.rate;
+    });
+    return at == all.end() ? number : static_cast<int>(at - all.begin()) + 1;
+}
+
+/// The rates of all dwells in place of those at the reference frequency, and what counts them.
+void take_rates(const SpectrumResult& spectrum, uncertainty::Assessment& to) {
+    const auto own = std::exchange(to.rates, rates_of(spectrum));
+    // A filter's own reason counts all dwells of the campaign.
+    for (uncertainty::Reason& reason : to.verdict.reasons)
+        if (reason.code != "dwell") reason.dwell = among_all(reason.dwell, own, to.rates);
+    for (auto& gyro : to.drift)
+        gyro.step.after_dwell = among_all(gyro.step.after_dwell, own, to.rates);
 }
 
 /// With what a row shook; nothing: it is not known. No bands: at rest.
@@ -126,6 +148,10 @@ double SpectrumResult::at_hz(std::size_t parameter) const {
     // Bias and linear terms know no frequency.
     const bool linear = internal / estimator::kGyros < estimator::kDii;
     return linear || analysis.gyros[internal % estimator::kGyros].resonant() ? 0 : reference_hz;
+}
+
+bool SpectrumResult::same_at_all() const {
+    return analysis.form == Form::flat && !analysis.flat.alarm && analysis.model.refusal.empty();
 }
 
 Form form_of(const std::string& name) {
@@ -182,12 +208,23 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
     if (!spectrum.several()) return;
     const Analysis& of = spectrum.analysis;
     assessed.over_frequency = true;
+    // It grows with the frequency.
+    uncertainty::take_sync(spectrum.table.rows(), assessed);
     tell_coefficients(spectrum, settings.uncertainty, assessed);
-    assessed.rates = rates_of(spectrum);
+    take_rates(spectrum, assessed);
+    auto& reasons = assessed.verdict.reasons;
+    std::erase_if(reasons, [](const auto& reason) { return reason.code == "sync motion"; });
+    if (auto motion = uncertainty::motion_in_step(settings, assessed))
+        reasons.insert(reasons.begin(), std::move(*motion));
+    uncertainty::conclude(assessed, assessed.verdict);
+    if (!assessed.freed.empty())
+        doubt(assessed,
+              "over frequency nothing is freed: what estimator.free names is in the coefficients",
+              uncertainty::Level::not_valid);
     if (of.flat.alarm && of.form != Form::resonance)
-        doubt(assessed.verdict, "quadratic coefficients depend on the frequency (p = " +
-                                    std::to_string(of.flat.p) + " that they do not)");
-    if (!of.model.refusal.empty()) doubt(assessed.verdict, of.model.refusal);
+        doubt(assessed, "quadratic coefficients depend on the frequency (p = " +
+                            std::to_string(of.flat.p) + " that they do not)");
+    if (!of.model.refusal.empty()) doubt(assessed, of.model.refusal);
 }
 
 Assessed assess(const estimator::Settings& settings, const std::optional<noise::Found>& found,
@@ -200,11 +237,11 @@ Assessed assess(const estimator::Settings& settings, const std::optional<noise::
     if (out.spectrum) adopt(*out.spectrum, in_force, out.assessed);
     const bool others = std::ranges::any_of(
         rows, [](const estimator::DwellRow& row) { return row.apart && !row.held_out; });
-    if (others && rows.size() > kMostSpectralDwells)
-        doubt(out.assessed.verdict, "there are no coefficients over frequency of " +
-                                        std::to_string(rows.size()) + " dwells (" +
-                                        std::to_string(kMostSpectralDwells) +
-                                        " at most): those at the reference frequency stand");
+    if (!out.spectrum && others && rows.size() > kMostSpectralDwells)
+        doubt(out.assessed, "there are no coefficients over frequency of " +
+                                std::to_string(rows.size()) + " dwells (" +
+                                std::to_string(kMostSpectralDwells) +
+                                " at most): those at the reference frequency stand");
     return out;
 }
 

@@ -26,6 +26,8 @@ struct SpectrumResult {
     /// Of one of the 30, order of parameter_names(): the frequency it is of, 0: static, or it knows
     /// none; Hz.
     [[nodiscard]] double at_hz(std::size_t parameter) const;
+    /// Nothing says that the quadratic coefficients depend on the frequency.
+    [[nodiscard]] bool same_at_all() const;
     [[nodiscard]] bool several() const { return table.kinds().size() > 1 || !sweeps.empty(); }
 };
 

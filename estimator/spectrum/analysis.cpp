@@ -42,18 +42,23 @@ double variance_of(const SpectralDwell& dwell, std::size_t j, double shaken) {
     return dwell.row.variance[j][j] + level * level;
 }
 
-/// What the gains, kBase x n for each gyro, let through of the rates' noise.
-VectorXd noise_of(const SpectralTable& table, const std::array<MatrixXd, 3>& gains,
-                  const MatrixXd& shaken) {
-    VectorXd out(3 * kBase), variance(table.dwells());
+/// What the gains, kBase x n for each gyro, let through of the rates' noise, and that of the rates.
+void put_noise(const SpectralTable& table, const std::array<MatrixXd, 3>& gains,
+               const MatrixXd& declared, Analysis& out) {
+    const Index n = table.dwells();
+    out.noise.resize(3 * kBase);
+    out.rate_sigma.resize(n, 3);
+    VectorXd variance(n);
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
-        for (Index k = 0; k < table.dwells(); ++k)
-            variance[k] = variance_of(table.list()[static_cast<std::size_t>(k)], j, shaken(k, g));
+        for (Index k = 0; k < n; ++k) {
+            const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
+            variance[k] = variance_of(dwell, j, out.vibration_rates(k, g));
+            out.rate_sigma(k, g) = std::sqrt(variance[k] + declared.row(3 * k + g).squaredNorm());
+        }
         for (Index a = 0; a < kBase; ++a)
-            out[3 * a + g] = std::sqrt(gains[j].row(a).cwiseAbs2().dot(variance));
+            out.noise[3 * a + g] = std::sqrt(gains[j].row(a).cwiseAbs2().dot(variance));
     }
-    return out;
 }
 
 uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::DwellTable& times,
@@ -334,7 +339,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
                                         : gain(table, j, problems[j], out.gyros[j].list.front());
-    out.noise = noise_of(table, gains, out.vibration_rates);
+    put_noise(table, gains, declared.rates, out);
     const MatrixXd effect = add_effects(gains, declared, out);
     form == Form::groups ? put_groups(groups, effect, out) : put_together(table, effect, out);
     set_reach(settings, table, out);

@@ -34,6 +34,7 @@ struct Analysis {
     /// What of covariance_a the dwells' noise alone leaves in the likeliest hypothesis, as standard
     /// deviations; filter order.
     Eigen::VectorXd noise;
+    Eigen::MatrixXd rate_sigma;  ///< of the rates, noise and declared inputs, n x 3, deg/h
 
     /// For some gyro a resonance is likelier than none.
     [[nodiscard]] bool resonant() const;

@@ -198,16 +198,6 @@ double worst_step(const std::array<GyroRates, 3>& gyros) {
     return worst;
 }
 
-void tell_sync(const DwellTable& table, Assessment& out) {
-    for (const DwellRow& row : table.rows) {
-        const double a0_square = 2 * (row.vibration.kappa - 1);
-        if (!(a0_square > 0) || !(row.frequency_hz > 0)) continue;
-        out.sync_arcsec = std::max(out.sync_arcsec, row.sync_arcsec);
-        out.sync_bound =
-            std::max(out.sync_bound, coning_bound(row.frequency_hz, row.sync_arcsec, a0_square));
-    }
-}
-
 void tell_cross_axis(const DwellTable& table, Assessment& out) {
     std::map<int, std::pair<int, LevelTensor>> runs;
     for (const DwellRow& row : table.rows) {
@@ -288,6 +278,16 @@ const char* word_of(Level level) noexcept {
     return level == Level::valid ? "valid" : level == Level::doubtful ? "doubtful" : "not valid";
 }
 
+void take_sync(std::span<const DwellRow> rows, Assessment& to) {
+    for (const DwellRow& row : rows) {
+        const double a0_square = 2 * (row.vibration.kappa - 1);
+        if (!(a0_square > 0) || !(row.frequency_hz > 0)) continue;
+        to.sync_arcsec = std::max(to.sync_arcsec, row.sync_arcsec);
+        to.sync_bound =
+            std::max(to.sync_bound, coning_bound(row.frequency_hz, row.sync_arcsec, a0_square));
+    }
+}
+
 Assessment assess(const Settings& settings, const Result& result, Stage stage) {
     Assessment out;
     DwellTable table = dwell_table(result.rows);
@@ -333,7 +333,7 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         out.gain = all.gain;
         out.covariance_type_a = all.covariance;
         out.ramps = fit_ramps(table, all.value);
-        tell_sync(table, out);
+        take_sync(table.rows, out);
         tell_cross_axis(table, out);
         out.worst_step = worst_step(of.gyros);
         tell_rates(table, fit.residual(all.value), fit.residual_variance(inputs.rates.cols()), out);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,9 @@ struct Assessment {
     Eigen::MatrixXd gain, covariance_type_a, sensitivity;
     std::vector<InputSignature> inputs;
 };
+
+/// Largest motion in step with the vibration in these dwells, and what it may do.
+void take_sync(std::span<const DwellRow> rows, Assessment& to);
 
 /// Whether dwells are still to come. Then what is not observable yet is no reason of a verdict.
 enum class Stage : std::uint8_t { under_way, ended };

@@ -132,6 +132,7 @@ double RampFit::log_evidence() const {
 
 RampFit fit_ramps(const DwellTable& table, const VectorXd& coefficients) {
     RampFit fit;
+    fit.degrees = 3 * table.rows.size();
     std::array<double, 3> weight{}, sum{};
     for (const DwellRow& row : table.rows) {
         for (std::size_t j = 0; j < 3; ++j) {

@@ -66,6 +66,7 @@ class NullFit {
 /// gyro the weighted mean with its sigma, deg/h per 100 s.
 struct RampFit {
     double chi_square = 0;
+    std::size_t degrees = 0;
     std::array<double, 3> mean{}, sigma{};
     [[nodiscard]] double log_evidence() const;
 };

@@ -237,25 +237,6 @@ void add_chi_square(const Assessment& a, std::vector<Reason>& list) {
                         Level::doubtful});
 }
 
-void add_sync(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
-    if (settings.uncertainty.sync_motion != SyncMotionOf::warn) return;
-    double largest = 0;
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        if (internal_of(i) / kGyros < kDii || !(a.coefficients[i].u > 0)) continue;
-        largest = std::max(largest, a.sync_bound / std::sqrt(3.0) / a.coefficients[i].u);
-    }
-    if (!(largest > 0.3)) return;
-    Reason reason{"sync motion",
-                  text("the angles move by %.1f arcsec in step with the vibration: up to %.1e "
-                       "deg/h/g^2 by coning, if it is the platform that moves",
-                       a.sync_arcsec, a.sync_bound),
-                  largest > 2 ? Level::not_valid : Level::doubtful};
-    reason.size = a.sync_arcsec;
-    reason.unit = "arcsec";
-    reason.largest_effect_u = largest;
-    list.push_back(std::move(reason));
-}
-
 void add_signs(const Assessment& a, std::vector<Reason>& list) {
     double mean = 0;
     for (std::size_t j = 0; j < kGyros; ++j)
@@ -345,11 +326,39 @@ std::string sentence_of(const Assessment& a, const Verdict& verdict) {
     if (verdict.level == Level::valid)
         return text("valid: %d degrees of freedom, p = %.2g, smallest misfit seen with 90 %%: ",
                     a.degrees, a.p) +
-               smallest_seen(a);
+               smallest_seen(a) +
+               (a.over_frequency ? text("; over frequency: %zu dwells", a.rates.size()) : "");
     return std::string(word_of(verdict.level)) + ", because " + verdict.reasons.front().text;
 }
 
 }  // namespace
+
+std::optional<Reason> motion_in_step(const Settings& settings, const Assessment& a) {
+    if (settings.uncertainty.sync_motion != SyncMotionOf::warn) return {};
+    double largest = 0;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        if (internal_of(i) / kGyros < kDii || !(a.coefficients[i].u > 0)) continue;
+        largest = std::max(largest, a.sync_bound / std::sqrt(3.0) / a.coefficients[i].u);
+    }
+    if (!(largest > 0.3)) return {};
+    Reason reason{"sync motion",
+                  text("the angles move by %.1f arcsec in step with the vibration: up to %.1e "
+                       "deg/h/g^2 by coning, if it is the platform that moves",
+                       a.sync_arcsec, a.sync_bound),
+                  largest > 2 ? Level::not_valid : Level::doubtful};
+    reason.size = a.sync_arcsec;
+    reason.unit = "arcsec";
+    reason.largest_effect_u = largest;
+    return reason;
+}
+
+void conclude(const Assessment& a, Verdict& verdict) {
+    std::vector<Reason>& list = verdict.reasons;
+    std::stable_sort(list.begin(), list.end(),
+                     [](const Reason& x, const Reason& y) { return x.level > y.level; });
+    verdict.level = list.empty() ? Level::valid : list.front().level;
+    verdict.sentence = sentence_of(a, verdict);
+}
 
 Verdict judge(const Settings& settings, const Result& result, const Assessment& a, Stage stage) {
     Verdict verdict;
@@ -359,7 +368,7 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     // Of reasons alike in level what names a cause comes first, then what may be its consequence:
     // angles that move with the vibration look like noise.
     if (a.done) {
-        add_sync(settings, a, list);
+        if (auto reason = motion_in_step(settings, a)) list.push_back(std::move(*reason));
         add_patterns(settings, a, stage, list);
         add_chi_square(a, list);
         add_order(settings, a, list);
@@ -374,10 +383,7 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
         add_cross_check(result.cross_check, list);
         if (settings.method == Method::joint) add_chi_square(a, list);
     }
-    std::stable_sort(list.begin(), list.end(),
-                     [](const Reason& x, const Reason& y) { return x.level > y.level; });
-    verdict.level = list.empty() ? Level::valid : list.front().level;
-    verdict.sentence = sentence_of(a, verdict);
+    conclude(a, verdict);
     return verdict;
 }
 

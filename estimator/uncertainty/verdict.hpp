@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -7,5 +9,11 @@ namespace vibrig::estimator::uncertainty {
 /// What the rules say of an assessment that is complete but for its verdict.
 [[nodiscard]] Verdict judge(const Settings& settings, const Result& result,
                             const Assessment& assessed, Stage stage);
+
+/// Motion in step with the vibration, where it may matter beside u and nobody has said whose it is.
+[[nodiscard]] std::optional<Reason> motion_in_step(const Settings& settings,
+                                                   const Assessment& assessed);
+/// Puts the reasons in order; level and sentence follow from them.
+void conclude(const Assessment& assessed, Verdict& verdict);
 
 }  // namespace vibrig::estimator::uncertainty

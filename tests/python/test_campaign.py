@@ -68,9 +68,12 @@ def test_compensation_by_hand(campaign):
         campaign.compensation([0, 0, 0], table_g=float("nan"))
 
 
-@pytest.mark.parametrize("model, refused", [("resonance", True), ("groups", True), ("flat", False)])
-def test_compensation_over_frequency(recording, model, refused):
-    recording.part(1, 10 * SECOND, [1, 2, 3], 2, result={"spectrum": {"model": model}})
+@pytest.mark.parametrize("spectrum, refused", [
+    ({"model": "resonance"}, True), ({"model": "groups"}, True), ({"model": "flat"}, False), (None, False),
+    ({"model": "flat", "flat": {"alarm": True}, "refusal": None}, True), ({"model": "flat", "flat": None, "refusal": "two"}, True),
+    ({"model": "flat", "flat": {"alarm": False}, "refusal": None}, False)])
+def test_compensation_over_frequency(recording, spectrum, refused):
+    recording.part(1, 10 * SECOND, [1, 2, 3], 2, result={"spectrum": spectrum})
     campaign = vibrig.open(recording.folder)
     assert campaign.compensation([0, 0, 0]).determined.all()
     if refused:

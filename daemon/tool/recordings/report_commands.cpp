@@ -301,9 +301,7 @@ double level_of(const char* option, const std::string& text) {
 /// nothing of the drift under vibration.
 std::string about_frequencies(const std::string& path, const Assessed& of, double level_g) {
     if (!of.spectrum) return {};
-    using estimator::spectrum::Form;
-    const auto form = of.spectrum->analysis.form;
-    if (form == Form::flat) return "of several frequencies, at which they do not differ";
+    if (of.spectrum->same_at_all()) return "of several frequencies, at which they do not differ";
     if (level_g > 0)
         throw std::runtime_error(
             path +

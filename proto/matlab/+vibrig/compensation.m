@@ -21,8 +21,7 @@ end
 if ~(level >= 0 && level <= 1000)
   error('vibrig:argument', 'level: found %g, expected 0 to 1000 g', level);
 end
-if level > 0 && isfield(campaign.result, 'spectrum') && isfield(campaign.result.spectrum, 'model') ...
-    && ~strcmp(campaign.result.spectrum.model, 'flat')
+if level > 0 && isfield(campaign.result, 'spectrum') && depends_on_frequency(campaign.result.spectrum)
   error('vibrig:argument', ['found quadratic coefficients that depend on the frequency, expected a level of 0 ' ...
                             '(vibrig predict has the drift under a vibration)']);
 end
@@ -48,6 +47,12 @@ for gyro = 1:3
   drift(gyro) = h' * value(own);
   residual(gyro) = sqrt(max(0, h' * covariance(own, own) * h));
 end
+end
+
+function depends = depends_on_frequency(spectrum)
+depends = isfield(spectrum, 'model') && ~strcmp(spectrum.model, 'flat') ...
+    || isfield(spectrum, 'refusal') && ~isempty(spectrum.refusal) ...
+    || isfield(spectrum, 'flat') && isfield(spectrum.flat, 'alarm') && any(spectrum.flat.alarm);
 end
 
 function value = value_of(campaign, key)

@@ -236,8 +236,10 @@ class Campaign:
         if not 0 <= level <= 1000:
             raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")
         with _reading(self.parts[-1]):
-            model = (self.result.get("spectrum") or {}).get("model", "flat")
-        if level > 0 and model != "flat":
+            spectrum = self.result.get("spectrum") or {}
+            depends = spectrum and (spectrum.get("model") != "flat" or spectrum.get("refusal") or
+                                    (spectrum.get("flat") or {}).get("alarm"))
+        if level > 0 and depends:
             raise ValueError(f"{self.parts[0]}: found quadratic coefficients that depend on the frequency, expected a level "
                              "of 0 (vibrig predict has the drift under a vibration)")
         with _reading(self.parts[0]):

@@ -87,6 +87,35 @@ TEST_F(Certificate, SaysOnThePageWhatItSaysInJson) {
     EXPECT_THAT(page, ::testing::Not(HasSubstr("class=\"mark\"")));
 }
 
+TEST_F(Certificate, OverFrequencySaysOfWhichVibrationACoefficientIs) {
+    EXPECT_TRUE(made()["frequencies"].is_null());
+    EXPECT_THAT(certificate_page(made()), ::testing::Not(HasSubstr("<th>vibration</th>")));
+    for (std::size_t i = 0; i < estimator::kParameters; ++i)
+        result_["parameters"][i]["at_hz"] = i == 14 ? 15.1 : 0.0;
+    result_["spectrum"] = {{"model", "resonance"},
+                           {"refusal", nullptr},
+                           {"flat", {{"alarm", true}}},
+                           {"highest_hz", 125}};
+    const std::string page = certificate_page(made());
+    for (const char* words :
+         {"<th>vibration</th>", "<td>deg/h</td><td>any</td>", "<td>deg/h/g^2</td><td>static</td>",
+          "<td>deg/h/g^2</td><td>15.1 Hz</td>", "do not give the drift under a vibration"})
+        EXPECT_THAT(page, HasSubstr(words));
+    // Flat, and nothing against it: of all frequencies.
+    result_["spectrum"] = {{"model", "flat"}, {"refusal", nullptr}, {"flat", {{"alarm", false}}}};
+    EXPECT_THAT(certificate_page(made()), HasSubstr("that depend on them were not found"));
+    // An alarm against it, or what does not fit: not so.
+    for (const char* what : {"flat", "refusal"}) {
+        Json spectrum = {{"model", "flat"}, {"refusal", nullptr}, {"flat", nullptr}};
+        if (std::string(what) == "flat")
+            spectrum["flat"] = {{"alarm", true}};
+        else
+            spectrum["refusal"] = "two resonances";
+        result_["spectrum"] = spectrum;
+        EXPECT_THAT(certificate_page(made()), HasSubstr("coefficients depend on them")) << what;
+    }
+}
+
 TEST_F(Certificate, OfADoubtfulResultOrASimulatedRigSaysSoAcrossThePage) {
     result_["verdict"] = {{"word", "doubtful"},
                           {"reasons", {{{"code", "walk"}, {"text", "biases walk"}}}}};

@@ -35,9 +35,11 @@ std::vector<DwellRow> rows_of(const Truth& truth, std::size_t surveys) {
 Assessed assessed(const std::vector<DwellRow>& rows) {
     estimator::Settings settings = gain_declared();
     settings.frequency_hz = 15;
+    settings.drift.power = estimator::uncertainty::Power::unbroken;
     estimator::Result result;
     result.rows = estimator::without_apart(rows);
     result.observable.fill(true);
+    result.cross_check.done = true;
     return assess(settings, {}, result, rows, {});
 }
 
@@ -80,6 +82,51 @@ TEST(AssessOverFrequency, ACampaignHasTheStaticCoefficientsOfARigThatResonates) 
     }
     EXPECT_EQ(all.assessed.rates.size(), rows.size());
     EXPECT_NE(all.assessed.coefficients[4].value, one.assessed.coefficients[4].value);
+}
+
+TEST(AssessOverFrequency, WhatCountsDwellsCountsThemAll) {
+    const std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    const Assessed all = assessed(rows), one = assessed(estimator::without_apart(rows));
+    // Ramps were fitted in the dwells of the first frequency alone.
+    EXPECT_EQ(all.assessed.ramps.degrees, 3 * one.assessed.rates.size());
+    // What is left of a rate has the declared gain in it, where it shook.
+    for (const auto& rate : all.assessed.rates) {
+        for (std::size_t j = 0; j < 3; ++j) {
+            EXPECT_GE(rate.residual_sigma[j], rate.sigma[j] * (1 - 1e-12));
+            if (rate.level_g > 1) {
+                EXPECT_GT(rate.residual_sigma[j], 1.0001 * rate.sigma[j]);
+            }
+        }
+    }
+    EXPECT_THAT(all.assessed.verdict.sentence, HasSubstr("valid: 33 degrees of freedom"));
+    EXPECT_THAT(all.assessed.verdict.sentence, HasSubstr("; over frequency: 63 dwells"));
+    EXPECT_THAT(one.assessed.verdict.sentence, Not(HasSubstr("over frequency")));
+}
+
+TEST(AssessOverFrequency, MotionInStepIsLookedForAtAllFrequencies) {
+    std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    EXPECT_THAT(words_of(assessed(rows)), Not(HasSubstr("in step")));
+    // GIVEN 20 arcsec, at the highest frequency alone, and never at the first
+    for (DwellRow& row : rows)
+        if (row.commanded_hz == 125) row.sync_arcsec = 20;
+    const Assessed found = assessed(rows);
+    EXPECT_EQ(found.assessed.sync_arcsec, 20);
+    EXPECT_THAT(words_of(found), HasSubstr("the angles move by 20.0 arcsec in step"));
+    EXPECT_EQ(found.assessed.verdict.level, estimator::uncertainty::Level::not_valid);
+    EXPECT_THAT(words_of(assessed(estimator::without_apart(rows))), Not(HasSubstr("in step")));
+}
+
+TEST(AssessOverFrequency, WhatIsFreedIsNotFreedThereAndTheVerdictSaysSo) {
+    const std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    estimator::Settings settings = gain_declared();
+    settings.frequency_hz = 15;
+    settings.free = {estimator::uncertainty::Misfit::azimuth};
+    estimator::Result result;
+    result.rows = estimator::without_apart(rows);
+    result.observable.fill(true);
+    const Assessed found = assess(settings, {}, result, rows, {});
+    EXPECT_EQ(found.assessed.verdict.level, estimator::uncertainty::Level::not_valid);
+    EXPECT_THAT(words_of(found), HasSubstr("over frequency nothing is freed"));
 }
 
 TEST(AssessOverFrequency, MoreDwellsThanItTakesAreSaid) {
