@@ -139,6 +139,28 @@ def stuck_contactor(checks, programs, folder):
         rig.stop()
 
 
+def pressed_in_time(checks, programs, folder):
+    """After an abort, while the table still moves: no row of the interlock watches the chain then."""
+    rig = Liar(programs, folder)
+    try:
+        rig.shake(checks)
+        rig.order("fault stuck-contactor")
+        time.sleep(0.5)
+        rig.tool("abort", "--by", "Ada")
+        rig.order("estop open")
+        status = rig.wait_for(lambda s: s["interlock"].get("latches"), 10)
+        names = [latch["name"] for latch in status["interlock"].get("latches", [])]
+        checks.check(names[:1] == ["emergency_stop"] and status["campaign"]["state"] == "tripped",
+                     "an emergency stop pressed while an aborted table moves is a trip and latched", f"{names} {status['campaign']}")
+        rig.order("clear")
+        rig.order("estop close")
+        rig.wait_for(lambda s: not s["shaker"].get("emergency_stop_open") and s["shaker"].get("rest") == "at rest", 30)
+        checks.check(rig.tool("arm", "--by", "Ada").returncode == 1, "and keeps the rig disarmed")
+        checks.equal(rig.tool("ack", "trip", "--by", "Ada").returncode, 0, "until it is acknowledged")
+    finally:
+        rig.stop()
+
+
 def blind(checks, programs, folder):
     """Killed at 5 g, and the next life sees neither bus nor controller: nobody knows, and that is no rest."""
     rig = Liar(programs, folder)
@@ -210,7 +232,7 @@ def obeyed(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (acknowledged_without_stop, stuck_contactor, blind, obeyed):
+    for part in (acknowledged_without_stop, stuck_contactor, pressed_in_time, blind, obeyed):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()
