@@ -318,10 +318,9 @@ Analysis analyse(const Campaign& campaign, const configuration::Configuration& r
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
     out.coefficients = final_coefficients(campaign.path, out.replayed);
-    auto whole = tool::assess(settings, out.replayed.found, out.replayed.result, out.replayed.rows,
-                              record::shaken_of(campaign, rig));
-    out.assessed = std::move(whole.assessed);
-    if (whole.spectrum) out.reference_hz = settings.frequency_hz;
+    out.assessed = tool::assess(settings, out.replayed.found, out.replayed.result,
+                                out.replayed.rows, record::shaken_of(campaign, rig))
+                       .assessed;
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

@@ -41,7 +41,6 @@ struct Analysis {
     record::ReplayResult replayed;
     Coefficients coefficients;                    ///< of a constant bias, sigma of noise alone
     estimator::uncertainty::Assessment assessed;  ///< over frequency, where there are several
-    double reference_hz = 0;  ///< of `coefficients` where there are several; 0: there is one
     estimator::Settings settings;
     Innovations innovations;
     std::vector<HeldOut> held_out;

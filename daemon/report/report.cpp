@@ -113,11 +113,11 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
 
 void add_coefficients(Page& page, const Analysis& a) {
     page.section("coefficients", "Coefficients");
-    if (a.reference_hz > 0)
+    if (a.assessed.over_frequency)
         page.paragraph(fmt::format(
             "Of the dwells at rest and at {:g} Hz alone, as the filter has them. The result, over "
             "frequencies, is in the sections Uncertainty and Over frequency.",
-            a.reference_hz));
+            a.settings.frequency_hz));
     Rows rows{{"coefficient", "value", "sigma", "95 % from", "95 % to", "unit", "expected sigma",
                "efficiency", "correlates with"}};
     for (std::size_t i = 0; i < kParameters; ++i) {
@@ -294,11 +294,11 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
             unit.unit_serial != earlier->paperwork.unit_serial)
             page.paragraph("Warning: this is another unit than that of this campaign, " +
                            unit_text(unit) + ".");
-        if (a.reference_hz > 0)
+        if (a.assessed.over_frequency)
             page.paragraph(
                 fmt::format("Compared are the filter's, of rest and of {:g} Hz, with those of the "
                             "earlier campaign's own vibration.frequency_hz.",
-                            a.reference_hz));
+                            a.settings.frequency_hz));
         Rows rows{{"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
         double square = 0;
         std::size_t count = 0, apart = 0;

@@ -219,7 +219,8 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
     uncertainty::conclude(assessed, assessed.verdict);
     if (!assessed.freed.empty())
         doubt(assessed,
-              "over frequency nothing is freed: what estimator.free names is in the coefficients",
+              "over frequency nothing is freed: an error in what estimator.free names is in the "
+              "coefficients",
               uncertainty::Level::not_valid);
     if (of.flat.alarm && of.form != Form::resonance)
         doubt(assessed, "quadratic coefficients depend on the frequency (p = " +

@@ -123,14 +123,18 @@ def acknowledged_without_stop(checks, programs, folder):
         rig.stop()
 
 
+def aborted_in_vain(checks, rig):
+    rig.shake(checks)
+    rig.order("fault stuck-contactor")
+    time.sleep(0.5)
+    rig.tool("abort", "--by", "Ada")
+
+
 def stuck_contactor(checks, programs, folder):
     """Everything the controller says is rest."""
     rig = Liar(programs, folder)
     try:
-        rig.shake(checks)
-        rig.order("fault stuck-contactor")
-        time.sleep(0.5)
-        rig.tool("abort", "--by", "Ada")
+        aborted_in_vain(checks, rig)
         checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 1, "abort, then SIGTERM: status 1 while the table moves")
         log = rig.daemon.text()
         checks.check("stopped cleanly" not in log and "stop not obeyed" in log, "never \"stopped cleanly\"", log[-2000:])
@@ -143,10 +147,7 @@ def pressed_in_time(checks, programs, folder):
     """After an abort, while the table still moves: no row of the interlock watches the chain then."""
     rig = Liar(programs, folder)
     try:
-        rig.shake(checks)
-        rig.order("fault stuck-contactor")
-        time.sleep(0.5)
-        rig.tool("abort", "--by", "Ada")
+        aborted_in_vain(checks, rig)
         rig.order("estop open")
         status = rig.wait_for(lambda s: s["interlock"].get("latches"), 10)
         names = [latch["name"] for latch in status["interlock"].get("latches", [])]

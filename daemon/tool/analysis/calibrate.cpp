@@ -66,13 +66,11 @@ void read(const Options& options, Study& study) {
                                   row[column[3]],
                                   sigma ? row[*sigma] : options.sigma};
         if (sigma && !(reading.sigma > 0))
-            plan::refuse(place + ": column sigma", proto::json_text(Json(reading.sigma)),
-                         "above 0");
+            plan::refuse(place + ": column sigma", Json(reading.sigma).dump(), "above 0");
         if (count) {
             // A mean of so many readings.
             if (!(row[*count] >= 1))
-                plan::refuse(place + ": column count", proto::json_text(Json(row[*count])),
-                             "1 or more");
+                plan::refuse(place + ": column count", Json(row[*count]).dump(), "1 or more");
             if (!(reading.sigma > 0) && row[*count] != 1)
                 plan::refuse(place + ": column count", "a mean without a sigma",
                              "--sigma or a column sigma, of one reading");

@@ -309,7 +309,7 @@ std::string about_frequencies(const std::string& path, const Assessed& of, doubl
             "--platform-g or --table-g (vibrig predict has the drift under a vibration)");
     std::string text = "of several frequencies, at which quadratic ones differ; here they are";
     for (std::size_t j = 0; j < 3; ++j) {
-        const double hz = of.spectrum->at_hz(10 * j + 4);
+        const double hz = of.spectrum->at_hz(estimator::kGroups * j + 4);  // D_II, as the others
         text += printed("%s gyro %c ", j == 0 ? "" : ",", "xyz"[j]) +
                 (hz > 0 ? printed("at %g Hz", hz) : std::string("static"));
     }
