@@ -273,10 +273,13 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     StatusData ended;
     campaign.fill(ended, with_.clock.now());
     write_result_file(text, complete);
-    // The journal first: the recording is closed with a head of it.
-    if (with_.journal) with_.journal->campaign_ended(name_of(ended.state), ended.reason, text);
+    // The journal first: the recording is closed with the head of this very entry.
+    std::uint64_t entry = 0;
+    if (with_.journal)
+        entry = with_.journal->campaign_ended(name_of(ended.state), ended.reason, text);
     if (with_.recorder)
-        with_.recorder->campaign_ended({name_of(ended.state), ended.reason, mark, text, utc_now()});
+        with_.recorder->campaign_ended(
+            {name_of(ended.state), ended.reason, mark, text, utc_now(), entry});
 }
 
 void CampaignDwells::write_result_file(const std::string& text, bool complete) {

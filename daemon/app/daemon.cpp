@@ -133,8 +133,9 @@ void Daemon::start_recording() {
     if (auto& recorder = parts_.recorder) {
         recorder->watch([this] { return parts_.estimator_stage.view().estimate; },
                         [this] { return control_.conditions(); });
-        recorder->sign_with(
-            [this] { return parts_.journal ? parts_.journal->status().head : std::string(); });
+        recorder->sign_with([this](std::uint64_t entry) {
+            return parts_.journal ? parts_.journal->head_with(entry) : std::string();
+        });
         recorder->start();
     }
     if (parts_.pre_trip) parts_.pre_trip->start();

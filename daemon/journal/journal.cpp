@@ -86,6 +86,12 @@ bool Journal::on_disk(std::uint64_t entry) const {
     return status_.written >= entry;
 }
 
+std::optional<std::string> Journal::head_with(std::uint64_t entry) const {
+    const std::lock_guard lock(mutex_);
+    if (status_.written < entry) return {};
+    return status_.head;
+}
+
 std::uint64_t Journal::armed(const std::string& by, const std::string& what) {
     return put(Safety{kArmed, {}, by, what, false, utc_now()});
 }
@@ -110,9 +116,9 @@ void Journal::dwell_done(const estimator::DwellInfo& info, const estimator::Dwel
                          const StopDone& stop) {
     put(Done{info, summary, stop});
 }
-void Journal::campaign_ended(const std::string& state, const std::string& reason,
-                             const std::string& result_json) {
-    put(Ended{state, reason, result_json, utc_now()});
+std::uint64_t Journal::campaign_ended(const std::string& state, const std::string& reason,
+                                      const std::string& result_json) {
+    return put(Ended{state, reason, result_json, utc_now()});
 }
 void Journal::loop_checked(const std::string& by, const std::string& out_of_band) {
     put(LoopChecked{by, out_of_band, utc_now()});

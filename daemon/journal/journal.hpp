@@ -81,6 +81,8 @@ class Journal {
 
     /// Whether the entry of this number, and all before it, are on disk. Any thread.
     [[nodiscard]] bool on_disk(std::uint64_t entry) const;
+    /// The signed head, once it has this entry in it. Any thread.
+    [[nodiscard]] std::optional<std::string> head_with(std::uint64_t entry) const;
 
     // Control thread. They queue; `kMostWaiting` at most, the rest is dropped and counted. Armings
     // and latches are never dropped; what returns a number says on_disk() with it.
@@ -93,8 +95,8 @@ class Journal {
     void campaign_resumed(std::int64_t id, const std::string& by);
     void dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
                     const StopDone& stop);
-    void campaign_ended(const std::string& state, const std::string& reason,
-                        const std::string& result_json);
+    std::uint64_t campaign_ended(const std::string& state, const std::string& reason,
+                                 const std::string& result_json);
     /// A loop check was completed; `out_of_band` is empty if all was in its band.
     void loop_checked(const std::string& by, const std::string& out_of_band);
     /// A proof of the safe state is over; `record` is kept as it is.

@@ -5,9 +5,11 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <thread>
 #include <utility>
 
 #include "daemon/dwells/anew.hpp"
@@ -490,7 +492,18 @@ void Recorder::write_rows() {
     }
 }
 
-std::string Recorder::journal_head() const { return journal_head_ ? journal_head_() : ""; }
+/// With the entry in it; where the journal's disk does not take that in time, as it is.
+std::string Recorder::journal_head(std::uint64_t entry) {
+    if (!journal_head_) return "";
+    constexpr std::int64_t kDiskPatience_ns = 2'000'000'000;
+    const std::int64_t until = steady_ns() + kDiskPatience_ns;
+    auto head = journal_head_(entry);
+    for (; !head && steady_ns() < until; head = journal_head_(entry)) {
+        alive();
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return head ? *head : journal_head_(0).value_or("");
+}
 
 void Recorder::take(const Ended& ended) {
     if (!head_) return;
@@ -506,7 +519,7 @@ void Recorder::take(const Ended& ended) {
     if (writer_) {
         try {
             Ended signed_end = ended;
-            signed_end.journal_head = journal_head();
+            signed_end.journal_head = journal_head(ended.journal_entry);
             writer_->end(signed_end);
             note(writer_->path());
         } catch (const hdf5::Error& error) {

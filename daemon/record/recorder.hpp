@@ -67,10 +67,10 @@ class Recorder {
         estimates_ = std::move(estimates);
         conditions_ = std::move(conditions);
     }
-    /// Likewise the signed head of the journal, for what is recorded.
-    void sign_with(std::function<std::string()> journal_head) {
-        journal_head_ = std::move(journal_head);
-    }
+    /// Likewise the signed head of the journal, for what is recorded, once the entry of this number
+    /// is in it.
+    using JournalHead = std::function<std::optional<std::string>(std::uint64_t entry)>;
+    void sign_with(JournalHead journal_head) { journal_head_ = std::move(journal_head); }
 
     void start();
     /// Writes what there is and ends the thread.
@@ -105,7 +105,7 @@ class Recorder {
     void find_folder();
     void close_previous();
     void note(const std::string& path);
-    [[nodiscard]] std::string journal_head() const;
+    [[nodiscard]] std::string journal_head(std::uint64_t entry = 0);
     void take(const Order& order);
     void take(const Dwell& dwell);
     void take(const Swept& swept);
@@ -135,7 +135,7 @@ class Recorder {
     EventSink on_event_;
     Estimates estimates_;
     Conditions conditions_;
-    std::function<std::string()> journal_head_;
+    JournalHead journal_head_;
     rt::Ring<FrameRecord> received_{65536};
     rt::Ring<FrameRecord> sent_{1024};
     rt::Ring<drivers::Sample> samples_{16384};

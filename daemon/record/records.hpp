@@ -104,7 +104,8 @@ struct Ended {
     std::string mark;  ///< why the campaign is marked; empty: it is not
     std::string result_json;
     std::int64_t utc_ns = 0;
-    std::string journal_head = {};  ///< signed, as it is now; empty: no journal is kept
+    std::uint64_t journal_entry = 0;  ///< that says so in the journal; 0: none does
+    std::string journal_head = {};    ///< signed, with that entry; empty: no journal is kept
 };
 
 /// The state of the filter, about once a second.

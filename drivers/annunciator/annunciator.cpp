@@ -78,7 +78,7 @@ void Annunciator::show(HornPattern pattern) {
         const std::lock_guard lock(mutex_);
         if (pattern_ == pattern) return;
         pattern_ = pattern;
-        status_.pattern = pattern;
+        if (!horn_) status_.pattern = pattern;
     }
     changed_.notify_one();
 }
@@ -122,6 +122,8 @@ void Annunciator::sound(Time now) {
     {
         const std::lock_guard lock(mutex_);
         changed = status_.confirms != confirms;
+        // Of a pattern that has not been read back yet nothing is said.
+        if (good || !confirms) status_.pattern = shown_;
         status_.confirms = confirms;
         status_.horn_note = confirms ? std::string() : horn_->note();
     }

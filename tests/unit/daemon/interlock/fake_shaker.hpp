@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -22,6 +23,7 @@ class FakeShaker final : public drivers::Shaker {
         return true;
     }
     void stop_now() noexcept override {
+        if (on_stop) on_stop();
         ++stops_asked;
         stop_waits = true;
     }
@@ -90,6 +92,7 @@ class FakeShaker final : public drivers::Shaker {
     drivers::ShakerReading now;
     drivers::ShakerCounters counts;
     std::vector<drivers::ShakerSetPoint> requests;
+    std::function<void()> on_stop;  ///< before it is ordered
     std::atomic<std::uint64_t> stops_asked{0};
     std::atomic<bool> stop_waits{false};
     drivers::Time hung_up_until = 0;

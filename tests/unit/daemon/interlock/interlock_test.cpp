@@ -41,6 +41,16 @@ TEST_F(InterlockTest, StopsAndWakesTheControlThreadOnAnOpenLoop) {
     EXPECT_TRUE(control->wait_until(clock.now() + drivers::kSecond));
 }
 
+TEST_F(InterlockTest, WhoSeesTheTripFindsItsStopOrdered) {
+    bool seen_before = false;
+    shaker.on_stop = [&] { seen_before = interlock.tripped() != Trip::none; };
+    interlock.guard(Guard::excitation);
+    platform.loop_closed = false;
+    interlock.check(sample, platform);
+    EXPECT_EQ(shaker.stops_asked, 1U);
+    EXPECT_FALSE(seen_before);
+}
+
 TEST_F(InterlockTest, StaysLatchedWithTheFirstCauseUntilAcknowledged) {
     interlock.guard(Guard::excitation);
     platform.loop_closed = false;

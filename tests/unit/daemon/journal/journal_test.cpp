@@ -189,6 +189,18 @@ TEST_F(JournalTest, OffersNothingThatWasEndedOrIsOfAnotherConfiguration) {
               (std::vector<std::string>{"finished", "{}"}));
 }
 
+TEST_F(JournalTest, GivesTheHeadThatAnEntryIsPartOf) {
+    Journal journal(path, kHash);
+    journal.campaign_begun("rig", "Ada");
+    const auto ended = journal.campaign_ended("finished", "", "{}");
+    EXPECT_FALSE(journal.head_with(ended)) << "nothing is written yet";
+    journal.start();
+    journal.stop();
+    const auto head = parse_head(journal.head_with(ended).value_or(""));
+    ASSERT_TRUE(head);
+    EXPECT_EQ(static_cast<std::uint64_t>(head->link.entry), journal.status().entries);
+}
+
 TEST_F(JournalTest, KeepsEventsAndWhoCommandedWhat) {
     {
         Journal journal(path, kHash);

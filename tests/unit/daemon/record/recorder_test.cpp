@@ -31,6 +31,7 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
     const auto counts = recorder.samples().counts();
     ASSERT_GT(counts.dropped, 0U);
     // WHEN it begins to look: what was there before the campaign is not of it, so once more
+    recorder.sign_with([](std::uint64_t entry) { return std::optional("head of " + std::to_string(entry)); });
     recorder.start();
     while (recorder.samples().counts().popped < counts.pushed) ::usleep(1000);
     for (std::size_t i = 0; i < 100; ++i) {
@@ -38,11 +39,12 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
         sample.time += 1000 * drivers::kSecond;
         running->samples().try_push(sample);
     }
-    recorder.campaign_ended({"finished", "", "", "{}", head().utc_ns});
+    recorder.campaign_ended({"finished", "", "", "{}", head().utc_ns, 7});
     recorder.stop();
     // THEN the file has what came after the beginning, and the gap
     const Campaign read = read_campaign(folder_.string());
     EXPECT_EQ(read.state, "finished");
+    EXPECT_EQ(read.head.journal_head, "head of 7") << "the one with the campaign's end in it";
     ASSERT_GE(read.samples.size(), 100U);
     EXPECT_EQ(read.samples.back().time, made[99].time + 1000 * drivers::kSecond);
     std::uint64_t lost = 0;

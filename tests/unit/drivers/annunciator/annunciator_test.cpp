@@ -151,6 +151,22 @@ TEST_F(AnnunciatorOnTheWire, AHornThatLiesIsItselfAnAlarm) {
     EXPECT_NE(annunciator.status().horn_note.find("reads back off"), std::string::npos);
 }
 
+TEST_F(AnnunciatorOnTheWire, OfAPatternNothingIsConfirmedBeforeItReadsBack) {
+    CoilServer server("mute");
+    auto settings = with_horn(server);
+    settings.horn.response_timeout = kSecond / 2;
+    Annunciator annunciator(settings, {});
+    annunciator.show(HornPattern::abort);
+    bool believed = false;
+    EXPECT_TRUE(eventually([&] {
+        const auto status = annunciator.status();
+        believed = believed || (status.pattern == HornPattern::abort && status.confirms);
+        return !status.confirms;
+    }));
+    EXPECT_FALSE(believed);
+    EXPECT_EQ(annunciator.status().pattern, HornPattern::abort);
+}
+
 TEST_F(AnnunciatorOnTheWire, ADeviceThatGoesAwayIsReportedBeforeItIsNeeded) {
     CoilServer server("honest");
     Said said;
