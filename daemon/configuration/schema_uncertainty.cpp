@@ -304,7 +304,7 @@ std::vector<Key> input_keys() {
                  "it: north, east"),
         declared("uncertainty.local_g", in(&Inputs::local_g), "", 1, "of local gravity, relative"),
         declared("uncertainty.bias_step_between_runs", in(&Inputs::bias_step_between_runs), "deg/h",
-                 1e4, "of each gyro's bias where the run changes"),
+                 1e4, "of each gyro's bias where the power may be cut: at the end of each run"),
         correlations(),
     };
 }

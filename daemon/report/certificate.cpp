@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "daemon/record/digest.hpp"
 #include "daemon/report/paperwork.hpp"
@@ -20,9 +21,36 @@ using record::Campaign;
 
 namespace {
 
-constexpr const char* kMethod =
-    "Identification under linear vibration (Tang et al. 2009): 30 coefficients from the platform's "
-    "drift at rest and under sinusoidal vibration along the vertical, estimated jointly.";
+/// With what the dwells shook that the coefficients rest on: "sinusoidal, random and swept-sine".
+std::string kinds_of_vibration(const Json& result) {
+    const auto found = result.find("spectrum");
+    const Json spectrum = found != result.end() && found->is_object() ? *found : Json::object();
+    const Json frequencies = spectrum.value("frequencies", Json::array()),
+               sweeps = spectrum.value("sweeps", Json::array());
+    const auto at_random = [](const Json& of) { return of.value("profile", Json()).is_string(); };
+    std::vector<std::string> kinds;
+    if (frequencies.empty() || !std::ranges::all_of(frequencies, at_random))
+        kinds.emplace_back("sinusoidal");
+    if (std::ranges::any_of(frequencies, at_random)) kinds.emplace_back("random");
+    if (std::ranges::any_of(sweeps, [](const Json& of) { return of.value("used", 0.0) > 0; }))
+        kinds.emplace_back("swept-sine");
+    std::string text = kinds.front();
+    for (std::size_t i = 1; i < kinds.size(); ++i)
+        text += (i + 1 < kinds.size() ? ", " : " and ") + kinds[i];
+    return text;
+}
+
+std::string method_of(const Json& result) {
+    // Results of earlier versions have no rates of the dwells.
+    const Json rates = result.value("dwell_rates", Json::array());
+    const bool rested = rates.empty() || std::ranges::any_of(rates, [](const Json& rate) {
+                            return rate.value("level", Json()) == 0;
+                        });
+    return fmt::format(
+        "Identification under linear vibration (Tang et al. 2009): 30 coefficients from the "
+        "platform's drift {}under {} vibration along the vertical, estimated jointly.",
+        rested ? "at rest and " : "", kinds_of_vibration(result));
+}
 
 /// Refuses what no customer may be given; else "valid" or "doubtful".
 std::string word_of(const Campaign& campaign, const Json& result,
@@ -155,15 +183,19 @@ Json conditions_of(const Campaign& campaign) {
 }
 
 Json annex_of(const Campaign& campaign, const Json& result, const record::ReplayResult& replayed) {
-    Json budget = Json::object();
+    Json budget = Json::object(), correlation = Json::object();
     for (const auto& p : result.value("parameters", Json::array())) {
-        if (p.contains("budget")) budget[p.value("name", "?")] = p["budget"];
+        const std::string name = p.value("name", "?");
+        if (p.contains("budget")) budget[name] = p["budget"];
+        const Json variance = p.value("correlation_variance", Json());
+        if (variance.is_number() && variance != 0) correlation[name] = variance;
     }
     Json files = Json::array();
     for (const auto& part : campaign.parts)
         files.push_back({{"file", std::filesystem::path(part.path).filename().string()},
                          {"sha256", record::sha256_of_file(part.path)}});
     return {{"budget", std::move(budget)},
+            {"correlation_variance", std::move(correlation)},
             {"recording", std::move(files)},
             {"configuration_sha256", record::sha256_of_text(campaign.head.configuration)},
             {"result_sha256", record::sha256_of_text(campaign.result_json)},
@@ -236,7 +268,7 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     root["campaign"] = campaign.head.campaign;
     root["performed_by"] = campaign.head.started_by;
     root["issued_by"] = issue.by;
-    root["method"] = kMethod;
+    root["method"] = method_of(result);
     root["frequencies"] = frequencies_of(result);
     root["deviations"] = deviations_of(replayed);
     root["equation"] = kDriftModel;

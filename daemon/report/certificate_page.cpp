@@ -121,8 +121,9 @@ void add_method(Page& page, const Json& c) {
     }
 }
 
-/// A row for each coefficient, a column for each input.
-Rows budget_of(const Json& budget) {
+/// A row for each coefficient, a column for each input, and one of correlations where there are
+/// any.
+Rows budget_of(const Json& budget, const Json& correlation) {
     std::vector<std::string> inputs;
     for (const auto& parts : budget) {
         for (const auto& part : parts) {
@@ -135,6 +136,7 @@ Rows budget_of(const Json& budget) {
         std::ranges::replace(input, '_', ' ');
         rows.front().push_back(input);
     }
+    if (!correlation.empty()) rows.front().emplace_back("correlations");
     for (const auto& [name, parts] : budget.items()) {
         std::vector<double> squares(inputs.size());
         for (const auto& part : parts) {
@@ -147,6 +149,10 @@ Rows budget_of(const Json& budget) {
         rows.push_back({name});
         for (const double square : squares)
             rows.back().push_back(fmt::format("{:.1e}", std::sqrt(square)));
+        if (correlation.empty()) continue;
+        const double variance = correlation.value(name, 0.0);
+        rows.back().push_back(
+            fmt::format("{:.1e}", std::copysign(std::sqrt(std::abs(variance)), variance)));
     }
     return rows;
 }
@@ -160,10 +166,16 @@ void add_annex(Page& page, const Json& c) {
     rows.push_back({"configuration", annex["configuration_sha256"]});
     rows.push_back({"result", annex["result_sha256"]});
     page.table(rows, "words hashes");
-    if (const auto budget = budget_of(annex["budget"]); budget.size() > 1) {
+    const Json correlation = annex.value("correlation_variance", Json::object());
+    if (const auto budget = budget_of(annex["budget"], correlation); budget.size() > 1) {
         page.paragraph(
             "Contributions to u, in the coefficient's unit; what comes in several elements, such "
             "as three axes, as the root of their squares' sum. One by one they are in the JSON.");
+        if (!correlation.empty())
+            page.paragraph(
+                "Correlations of the inputs: with a minus sign, the square is taken off the "
+                "others' "
+                "squares.");
         page.table(budget, "matrix");
     }
     page.paragraph("Recorded by " + annex.value("recorded_by", "") + ", issued with " +

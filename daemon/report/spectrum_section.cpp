@@ -5,17 +5,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <utility>
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/report/paperwork.hpp"
-#include "estimator/spectrum/elastic.hpp"
+#include "daemon/results/spectrum_json.hpp"
+#include "estimator/spectrum/prediction.hpp"
 
 namespace vibrig::report {
 
+using estimator::spectrum::Hypothesis;
 using tool::plot::Axis;
 using tool::plot::Chart;
 using tool::plot::Curve;
@@ -27,7 +29,6 @@ using SpectrumJson = nlohmann::json;
 
 /// In the order of the result's numbers.
 constexpr std::array<const char*, 6> kTerms{"II", "SS", "OO", "IS", "IO", "OS"};
-constexpr std::size_t kQuadratic = 4, kBase = 10;  ///< places in a hypothesis' numbers
 constexpr double kNinetyFive = 1.96;
 
 std::string shown(const SpectrumJson& value, const char* precision = "{:.5f}") {
@@ -107,46 +108,16 @@ void add_groups(Page& page, const SpectrumJson& frequencies) {
     page.table(rows);
 }
 
-/// What a hypothesis makes of a quadratic coefficient at a frequency: value and variance.
-std::pair<double, double> at_frequency(const SpectrumJson& one, std::size_t term, double hz) {
-    const SpectrumJson &x = one.at("x"), &p = one.at("p");
-    // Of each of its numbers so much.
-    std::vector<double> weight(x.size(), 0.0);
-    weight.at(kQuadratic + term) = 1;
-    const auto add = [&](std::size_t r, double f, double zeta) {
-        weight.at(kBase + kTerms.size() * r + term) =
-            estimator::spectrum::in_phase(hz, {f, zeta}) - 1;
-    };
-    const SpectrumJson &f = one.at("hz"), &zeta = one.at("damping");
-    if (f.is_number()) add(0, f.get<double>(), zeta.get<double>());
-    for (std::size_t r = 0; f.is_array() && r < f.size(); ++r)
-        add(r, f.at(r).get<double>(), zeta.at(r).get<double>());
-    double value = 0, variance = 0;
-    for (std::size_t a = 0; a < weight.size(); ++a) {
-        if (weight[a] == 0) continue;
-        value += weight[a] * x.at(a).get<double>();
-        for (std::size_t b = 0; b < weight.size(); ++b) {
-            if (weight[b] != 0) variance += weight[a] * weight[b] * p.at(a).at(b).get<double>();
-        }
-    }
-    return {value, variance};
-}
-
 /// Over the frequencies, with its band of 95 %; the inputs that are declared are not in it.
-Curve curve_of(const SpectrumJson& mixture, std::size_t term, double low, double high) {
+Curve curve_of(const std::vector<Hypothesis>& mixture, std::size_t term, double low, double high) {
     constexpr int kPoints = 200;
     Curve curve{.name = kTerms[term]};
     for (int i = 0; i <= kPoints; ++i) {
         const double hz = low * std::pow(high / low, static_cast<double>(i) / kPoints);
-        double mean = 0, square = 0;
-        for (const SpectrumJson& one : mixture) {
-            const auto [value, variance] = at_frequency(one, term, hz);
-            const double w = one.at("w").get<double>();
-            mean += w * value;
-            square += w * (variance + value * value);
-        }
-        const double wide = kNinetyFive * std::sqrt(std::max(0.0, square - mean * mean));
-        curve.add(hz, mean, mean - wide, mean + wide);
+        const auto [value, sigma] =
+            estimator::spectrum::at_frequency(mixture, static_cast<Eigen::Index>(term), hz);
+        const double wide = kNinetyFive * sigma;
+        curve.add(hz, value, value - wide, value + wide);
     }
     return curve;
 }
@@ -166,12 +137,14 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
     }
     if (!(high > low)) return;
     for (std::size_t j = 0; j < 3; ++j) {
+        std::vector<Hypothesis> mixture;
+        for (const SpectrumJson& one : spectrum.at("mixture").at(j))
+            mixture.push_back(tool::read_hypothesis(one));
         for (std::size_t term = 0; term < kTerms.size(); ++term) {
             Chart chart{.title = fmt::format("D_{}{} over frequency", kTerms[term], "xyz"[j]),
                         .x = Axis("Hz", true),
                         .y = Axis("deg/h/g^2")};
-            chart.curves.push_back(
-                curve_of(spectrum.at("mixture").at(j), term, low / 1.5, 1.5 * high));
+            chart.curves.push_back(curve_of(mixture, term, low / 1.5, 1.5 * high));
             chart.curves.back().name = "model, 95 %";
             Curve dwells{.name = "dwells of one frequency, 95 %", .look = Look::dots};
             for (const SpectrumJson& at : frequencies) {
@@ -303,7 +276,7 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
         for (const SpectrumJson& one : spectrum.value("not_told", SpectrumJson::array()))
             limits += (limits.ends_with(':') ? " " : "; ") + one.get<std::string>();
         if (!limits.ends_with(':')) page.paragraph(limits + ".");
-    } catch (const SpectrumJson::exception& error) {
+    } catch (const std::exception& error) {
         page.paragraph(std::string("The recorded result cannot be read: ") + error.what());
     }
 }

@@ -43,6 +43,9 @@ std::string largest_parts(const uncertainty::Coefficient& c) {
         text += fmt::format("{}{}{} {:.2g}", text.empty() ? "" : ", ", input, declared ? "" : "*",
                             std::sqrt(square));
     }
+    if (std::abs(c.correlation_part()) >= kSmallest * c.u)
+        text +=
+            fmt::format("{}correlations {:.2g}", text.empty() ? "" : ", ", c.correlation_part());
     return text;
 }
 
@@ -79,6 +82,10 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a, double covera
         "in the configuration; U = k u, with the k given, covers with a probability of about {:g} "
         "%. *: nothing was declared, a default stands in.",
         100 * coverage));
+    if (std::ranges::any_of(a.coefficients, [](const auto& c) { return c.correlation != 0; }))
+        page.paragraph(
+            "Squared, the parts add up to u squared; with a minus sign, what correlations of the "
+            "inputs have is taken off.");
     for (const auto& of : uncertainty::leverages(a)) {
         page.paragraph("What would shrink it most: " + uncertainty::advice(of) + ".");
         break;

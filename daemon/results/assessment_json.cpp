@@ -143,7 +143,8 @@ Json coefficient_json(const Coefficient& c) {
             {"k", number_or_null(c.k)},
             {"expanded", number_or_null(c.expanded)},
             {"u_use", number_or_null(c.u_use)},
-            {"budget", budget(c.budget)}};
+            {"budget", budget(c.budget)},
+            {"correlation_variance", number_or_null(c.u > 0 ? c.correlation : kNone)}};
 }
 
 Json assessment_json(const Assessment& a) {

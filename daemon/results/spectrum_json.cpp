@@ -127,6 +127,13 @@ Json effects_json(const std::vector<Effect>& effects) {
     return list;
 }
 
+/// Of each pair the places in the list of effects, and the correlation.
+Json correlated_json(const std::vector<estimator::uncertainty::Correlated>& pairs) {
+    Json list = Json::array();
+    for (const auto& pair : pairs) list.push_back({pair.first, pair.second, pair.value});
+    return list;
+}
+
 /// Rates of the dwells held out, those predicted for what happened in them, deg/h, and what is
 /// between the two in standard uncertainties of both.
 Json held_out_json(const SpectrumResult& of) {
@@ -190,33 +197,6 @@ MatrixXd read_rows(const nlohmann::json& list) {
     return out;
 }
 
-Hypothesis read_hypothesis(const nlohmann::json& from) {
-    Hypothesis one;
-    one.weight = from.at("w").get<double>();
-    if (!(one.weight > 0 && one.weight <= 1))
-        throw std::runtime_error("w: found " + from.at("w").dump() + ", expected a weight to 1");
-    const auto& hz = from.at("hz");
-    const auto& damping = from.at("damping");
-    if (hz.is_array()) {
-        for (std::size_t r = 0; r < hz.size(); ++r)
-            one.resonances.push_back({hz[r].get<double>(), damping.at(r).get<double>()});
-    } else if (hz.is_number()) {
-        one.resonances = {{hz.get<double>(), damping.get<double>()}};
-    }
-    one.x = read_vector(from.at("x"));
-    one.covariance = read_rows(from.at("p"));
-    const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
-    if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
-        throw std::runtime_error("found x of " + std::to_string(one.x.size()) + " and p of " +
-                                 std::to_string(one.covariance.rows()) + " x " +
-                                 std::to_string(one.covariance.cols()) + ", expected " +
-                                 std::to_string(columns) + " coefficients and a square");
-    if (!one.x.allFinite() || !one.covariance.allFinite())
-        throw std::runtime_error("x, p: found what is no number, expected numbers");
-    one.linearised = one.covariance.rows() > one.x.size();
-    return one;
-}
-
 void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
     settings.up = read_axis(frame.at("up").get<std::string>());
     for (std::size_t j = 0; j < 3; ++j) {
@@ -225,6 +205,22 @@ void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
                 read_axis(frame.at("gyro_axes").at(j).at(k).get<std::string>());
     }
     settings.elevation_deg = frame.at("elevation_deg").get<double>();
+}
+
+/// Earlier versions have none: their effects are mixed so that they are independent.
+void read_correlated(const nlohmann::json& spectrum, const std::string& place, Model& model) {
+    const auto pairs = spectrum.find("effects_correlation");
+    if (pairs == spectrum.end()) return;
+    for (const auto& pair : *pairs) {
+        const estimator::uncertainty::Correlated one{
+            pair.at(0).get<std::size_t>(), pair.at(1).get<std::size_t>(), pair.at(2).get<double>()};
+        const std::size_t count = model.effects.size();
+        if (one.first >= count || one.second >= count || !(std::abs(one.value) <= 1 + 1e-9))
+            throw std::runtime_error(place + "effects_correlation: found " + pair.dump() +
+                                     ", expected two of " + std::to_string(count) +
+                                     " effects and a number from -1 to 1");
+        model.correlated.push_back(one);
+    }
 }
 
 }  // namespace
@@ -274,7 +270,35 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
                         {"refusal", text_or_null(a.model.refusal)},
                         {"not_told", not_shown()},
                         {"effects", effects_json(a.model.effects)},
+                        {"effects_correlation", correlated_json(a.model.correlated)},
                         {"platform", frame_json(a.model.frame)}};
+}
+
+Hypothesis read_hypothesis(const nlohmann::json& from) {
+    Hypothesis one;
+    one.weight = from.at("w").get<double>();
+    if (!(one.weight > 0 && one.weight <= 1))
+        throw std::runtime_error("w: found " + from.at("w").dump() + ", expected a weight to 1");
+    const auto& hz = from.at("hz");
+    const auto& damping = from.at("damping");
+    if (hz.is_array()) {
+        for (std::size_t r = 0; r < hz.size(); ++r)
+            one.resonances.push_back({hz[r].get<double>(), damping.at(r).get<double>()});
+    } else if (hz.is_number()) {
+        one.resonances = {{hz.get<double>(), damping.get<double>()}};
+    }
+    one.x = read_vector(from.at("x"));
+    one.covariance = read_rows(from.at("p"));
+    const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
+    if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
+        throw std::runtime_error("found x of " + std::to_string(one.x.size()) + " and p of " +
+                                 std::to_string(one.covariance.rows()) + " x " +
+                                 std::to_string(one.covariance.cols()) + ", expected " +
+                                 std::to_string(columns) + " coefficients and a square");
+    if (!one.x.allFinite() || !one.covariance.allFinite())
+        throw std::runtime_error("x, p: found what is no number, expected numbers");
+    one.linearised = one.covariance.rows() > one.x.size();
+    return one;
 }
 
 Model read_model(const nlohmann::json& root, const std::string& path) {
@@ -313,6 +337,7 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
             }
             model.effects.push_back(std::move(effect));
         }
+        read_correlated(spectrum, place, model);
         model.lowest_hz = member(spectrum, "lowest_hz", place).get<double>();
         model.highest_hz = member(spectrum, "highest_hz", place).get<double>();
         const auto& refusal = member(spectrum, "refusal", place);

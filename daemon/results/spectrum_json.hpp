@@ -12,6 +12,9 @@ namespace vibrig::tool {
 /// were held out it has what was measured beside what the others foretell.
 void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 
+/// One of a gyro's `mixture`. Throws with what was found and expected.
+[[nodiscard]] estimator::spectrum::Hypothesis read_hypothesis(const nlohmann::json& from);
+
 /// Reads from the root `spectrum` of a file of vibrig identify --json, or of result.json, what
 /// a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,

@@ -88,6 +88,7 @@ void tell_coefficients(const SpectrumResult& spectrum, const uncertainty::Inputs
             c.budget.push_back({effect.input, effect.element, sensitivity, d.u, std::abs(change),
                                 d.shape, d.dof, d.declared});
         }
+        uncertainty::add_correlations(of.model.correlated, c);
         uncertainty::add_unseen(inputs, of.value, to.sync_bound, internal, c.budget);
         const std::size_t j = internal % estimator::kGyros;
         uncertainty::expand(inputs, internal,

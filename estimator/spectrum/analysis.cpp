@@ -213,19 +213,21 @@ void put_together(const SpectralTable& table, const MatrixXd& declared_effect, A
     out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
 }
 
-/// What the declared inputs do to each gyro's coefficients, and to the 30 together. `gains`: from
-/// the rates to a gyro's coefficients.
+/// Sets what each declared input does to each gyro's coefficients. Of the 30 together: this times
+/// its transpose is their covariance. `gains`: from the rates to a gyro's coefficients.
 MatrixXd add_effects(const std::array<MatrixXd, 3>& gains, const DeclaredRates& declared,
                      Analysis& out) {
     const Index m = declared.rates.cols();
     MatrixXd on_all = MatrixXd::Zero(static_cast<Index>(kParameters), m);
     out.model.effects = declared.effects;
+    out.model.correlated = declared.correlated;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
-        const MatrixXd moved = gains[j] * of_gyro(declared.rates, g);
+        const MatrixXd moved = gains[j] * of_gyro(declared.rates, g),
+                       root = gains[j] * of_gyro(declared.root, g);
         for (Index i = 0; i < m; ++i) {
             out.model.effects[static_cast<std::size_t>(i)].change[j] = moved.col(i);
-            for (Index a = 0; a < kBase; ++a) on_all(3 * a + g, i) = moved(a, i);
+            for (Index a = 0; a < kBase; ++a) on_all(3 * a + g, i) = root(a, i);
         }
     }
     return on_all;
@@ -330,16 +332,16 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         for (Index k = 0; k < n; ++k)
             rates.segment<3>(3 * k) = mapped(table.rows()[static_cast<std::size_t>(k)].rate);
         out.flat = test_flatness(
-            table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.rates),
+            table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.root),
             prior, scattered);
     }
     for (std::size_t j = 0; j < 3; ++j)
-        settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
+        settle(table, j, problems[j], of_gyro(declared.root, static_cast<Index>(j)), form, out);
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
     for (std::size_t j = 0; j < 3; ++j)
         gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))
                                         : gain(table, j, problems[j], out.gyros[j].list.front());
-    put_noise(table, gains, declared.rates, out);
+    put_noise(table, gains, declared.root, out);
     const MatrixXd effect = add_effects(gains, declared, out);
     form == Form::groups ? put_groups(groups, effect, out) : put_together(table, effect, out);
     set_reach(settings, table, out);

@@ -30,8 +30,9 @@ DeclaredRates declared_rates(const Settings& settings, const SpectralTable& tabl
             coefficients[internal_index(g, j)] =
                 groups(static_cast<Eigen::Index>(g), static_cast<Eigen::Index>(j));
     }
-    uncertainty::InputSignatures inputs = uncertainty::input_signatures(
-        settings.uncertainty, times, uncertainty::ForwardModel(settings, coefficients));
+    uncertainty::InputSignatures inputs =
+        uncertainty::input_signatures(settings.uncertainty, settings.drift, times,
+                                      uncertainty::ForwardModel(settings, coefficients));
     Eigen::VectorXd of_vibration(3 * table.dwells());
     for (Eigen::Index k = 0; k < table.dwells(); ++k)
         of_vibration.segment<3>(3 * k) = shaken.row(k).transpose();
@@ -42,7 +43,9 @@ DeclaredRates declared_rates(const Settings& settings, const SpectralTable& tabl
     }
     const Eigen::MatrixXd u = uncertainty::input_covariance(settings.uncertainty, inputs.list);
     DeclaredRates out;
-    out.rates = inputs.rates * linear_algebra::padded_root(u);
+    out.rates = inputs.rates * u.diagonal().cwiseSqrt().asDiagonal();
+    out.correlated = uncertainty::correlated(u);
+    out.root = inputs.rates * linear_algebra::padded_root(u);
     for (const auto& input : inputs.list)
         out.effects.push_back({input.input, input.element, {}, input.declared});
     const uncertainty::Declared& scatter = settings.uncertainty.gain_between_frequencies;
@@ -54,8 +57,10 @@ DeclaredRates declared_rates(const Settings& settings, const SpectralTable& tabl
             if (table.list()[static_cast<std::size_t>(k)].kind == kind)
                 z.segment<3>(3 * k) = 2 * between * of_vibration.segment<3>(3 * k);
         }
-        out.rates.conservativeResize(Eigen::NoChange, out.rates.cols() + 1);
-        out.rates.rightCols<1>() = z;
+        for (Eigen::MatrixXd* columns : {&out.rates, &out.root}) {
+            columns->conservativeResize(Eigen::NoChange, columns->cols() + 1);
+            columns->rightCols<1>() = z;
+        }
         const Kind& of = table.kinds()[kind];
         out.effects.push_back({"gain_between_frequencies",
                                of.profile.empty() ? hz_text(of.hz()) : of.profile,

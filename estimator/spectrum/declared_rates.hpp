@@ -12,9 +12,13 @@ namespace vibrig::estimator::spectrum {
 struct DeclaredRates {
     Eigen::MatrixXd rates;        ///< 3 n x m, one standard uncertainty each
     std::vector<Effect> effects;  ///< of each, without its change
+    std::vector<uncertainty::Correlated> correlated;
+    /// 3 n x m: this times its transpose is the rates' covariance. Where inputs are correlated its
+    /// columns are mixtures of theirs.
+    Eigen::MatrixXd root;
 };
 
-/// Correlations are worked in. `groups`: the coefficients, `shaken`: the dwells' rates due to
+/// `groups`: the coefficients, `shaken`: the dwells' rates due to
 /// vibration, n x 3.
 [[nodiscard]] DeclaredRates declared_rates(const Settings& settings, const SpectralTable& table,
                                            const Eigen::MatrixXd& groups,

@@ -32,26 +32,6 @@ struct Columns {
         }
         return x;
     }
-    /// With what a change of the resonances does, where the covariance holds it.
-    [[nodiscard]] MatrixXd gradient(std::size_t gyro, const Hypothesis& of_what) const {
-        const MatrixXd x = of(gyro, of_what.resonances);
-        if (!of_what.linearised) return x;
-        constexpr double kStep = 1e-5;
-        const std::size_t count = of_what.resonances.size();
-        MatrixXd out(x.rows(), x.cols() + 2 * static_cast<Index>(count));
-        out.leftCols(x.cols()) = x;
-        for (std::size_t i = 0; i < 2 * count; ++i) {
-            const auto moved = [&](double step) {
-                auto resonances = of_what.resonances;
-                Resonance& one = resonances[i % count];
-                (i < count ? one.hz : one.damping) *= std::exp(step);
-                return VectorXd(of(gyro, resonances) * of_what.x);
-            };
-            out.col(x.cols() + static_cast<Index>(i)) =
-                (moved(kStep) - moved(-kStep)) / (2 * kStep);
-        }
-        return out;
-    }
 };
 
 double share_outside(const Model& model, const Situation& in) {
@@ -77,7 +57,8 @@ void average(const Model& model, const Columns& columns, std::size_t gyro, Predi
     VectorXd mean = VectorXd::Zero(m);
     std::vector<VectorXd> values;
     for (const Hypothesis& one : model.mixture[gyro]) {
-        const MatrixXd g = columns.gradient(gyro, one);
+        const MatrixXd g =
+            gradient(one, [&](const std::vector<Resonance>& at) { return columns.of(gyro, at); });
         values.emplace_back(g.leftCols(one.x.size()) * one.x);
         mean += one.weight * values.back();
         within += one.weight * g * one.covariance * g.transpose();
@@ -98,25 +79,39 @@ void average(const Model& model, const Columns& columns, std::size_t gyro, Predi
     add_blocks(out.covariance, within + between, j);
 }
 
-void add_declared(const Model& model, const Columns& columns, const PredictionOptions& options,
-                  Prediction& out) {
+/// What each effect moves, 3 m: element 3 k + j.
+std::vector<VectorXd> moved_by(const Model& model, const Columns& columns,
+                               const PredictionOptions& options) {
     const auto m = static_cast<Index>(columns.at.size());
     std::array<MatrixXd, 3> x;
     for (std::size_t j = 0; j < 3; ++j) x[j] = columns.of(j, model.mixture[j].front().resonances);
-    MatrixXd square = MatrixXd::Zero(m, 3);
+    std::vector<VectorXd> list;
     for (const Effect& effect : model.effects) {
+        VectorXd& moved = list.emplace_back(VectorXd::Zero(3 * m));
         // What scales the profile's level as it scaled the campaign's cancels.
         if (options.same_accelerometers && effect.input == "accelerometer_gain") continue;
-        VectorXd moved(3 * m);
         for (Index j = 0; j < 3; ++j) {
             const VectorXd of_gyro =
                 x[static_cast<std::size_t>(j)] * effect.change[static_cast<std::size_t>(j)];
             for (Index k = 0; k < m; ++k) moved[3 * k + j] = of_gyro[k];
-            square.col(j) += of_gyro.cwiseAbs2();
         }
-        out.covariance += moved * moved.transpose();
     }
-    out.gain = square.cwiseSqrt();
+    return list;
+}
+
+void add_declared(const Model& model, const Columns& columns, const PredictionOptions& options,
+                  Prediction& out) {
+    const std::vector<VectorXd> moved = moved_by(model, columns, options);
+    MatrixXd declared = MatrixXd::Zero(out.covariance.rows(), out.covariance.cols());
+    for (const VectorXd& one : moved) declared += one * one.transpose();
+    for (const uncertainty::Correlated& pair : model.correlated) {
+        const MatrixXd shared =
+            pair.value * moved.at(pair.first) * moved.at(pair.second).transpose();
+        declared += shared + shared.transpose();
+    }
+    out.covariance += declared;
+    for (Index i = 0; i < declared.rows(); ++i)
+        out.gain(i / 3, i % 3) = std::sqrt(std::max(0.0, declared(i, i)));
 }
 
 void add_outside(const Model& model, const Columns& columns, const PredictionOptions& options,
@@ -146,6 +141,46 @@ void add_outside(const Model& model, const Columns& columns, const PredictionOpt
 }
 
 }  // namespace
+
+MatrixXd gradient(const Hypothesis& of,
+                  const std::function<MatrixXd(const std::vector<Resonance>&)>& columns) {
+    const MatrixXd x = columns(of.resonances);
+    if (!of.linearised) return x;
+    constexpr double kStep = 1e-5;
+    const std::size_t count = of.resonances.size();
+    MatrixXd out(x.rows(), x.cols() + 2 * static_cast<Index>(count));
+    out.leftCols(x.cols()) = x;
+    for (std::size_t i = 0; i < 2 * count; ++i) {
+        const auto moved = [&](double step) {
+            auto resonances = of.resonances;
+            Resonance& one = resonances[i % count];
+            (i < count ? one.hz : one.damping) *= std::exp(step);
+            return VectorXd(columns(resonances) * of.x);
+        };
+        out.col(x.cols() + static_cast<Index>(i)) = (moved(kStep) - moved(-kStep)) / (2 * kStep);
+    }
+    return out;
+}
+
+AtFrequency at_frequency(const std::vector<Hypothesis>& mixture, Index term, double hz) {
+    const auto row = [&](const std::vector<Resonance>& resonances) {
+        const auto count = static_cast<Index>(resonances.size());
+        MatrixXd out = MatrixXd::Zero(1, kBase + kElastic * count);
+        out(0, kBase - kElastic + term) = 1;
+        for (Index r = 0; r < count; ++r)
+            out(0, kBase + kElastic * r + term) =
+                in_phase(hz, resonances[static_cast<std::size_t>(r)]) - 1;
+        return out;
+    };
+    double mean = 0, square = 0;
+    for (const Hypothesis& one : mixture) {
+        const MatrixXd g = gradient(one, row);
+        const double value = g.row(0).head(one.x.size()).dot(one.x);
+        mean += one.weight * value;
+        square += one.weight * (g.row(0).dot(g.row(0) * one.covariance) + value * value);
+    }
+    return {mean, std::sqrt(std::max(0.0, square - mean * mean))};
+}
 
 double Prediction::u(Index situation, Index gyro) const {
     const Index at = 3 * situation + gyro;

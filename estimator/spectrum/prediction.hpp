@@ -2,11 +2,13 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "estimator/spectrum/exposure.hpp"
 #include "estimator/spectrum/resonance.hpp"
+#include "estimator/uncertainty/budget.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -18,12 +20,29 @@ struct Effect {
     uncertainty::Declared declared = {};
 };
 
+/// What one unit of each of a hypothesis' unknowns does to m quantities that are linear in its
+/// coefficients: `columns` gives m x (10 + 6 r) for r resonances. Of a linearised hypothesis with
+/// ln hz and ln damping of each, as its covariance has them.
+[[nodiscard]] Eigen::MatrixXd gradient(
+    const Hypothesis& of,
+    const std::function<Eigen::MatrixXd(const std::vector<Resonance>&)>& columns);
+
+/// A quadratic coefficient at a frequency over a mixture, deg/h/g^2: mean, and standard deviation
+/// within and between the hypotheses; declared inputs are not in it. `term`: II, SS, OO, IS, IO,
+/// OS.
+struct AtFrequency {
+    double value = 0, sigma = 0;
+};
+[[nodiscard]] AtFrequency at_frequency(const std::vector<Hypothesis>& mixture, Eigen::Index term,
+                                       double hz);
+
 /// All that a prediction needs of a campaign.
 struct Model {
     Settings frame;  ///< of it platform.up, the gyros' axes and site.elevation_deg count
     std::array<std::vector<Hypothesis>, 3> mixture;
     std::vector<Effect> effects;
-    double lowest_hz = 0;   ///< of the campaign's vibrations
+    std::vector<uncertainty::Correlated> correlated;  ///< of the effects
+    double lowest_hz = 0;                             ///< of the campaign's vibrations
     double highest_hz = 0;  ///< up to which an elastic part would have been seen
     std::string refusal;    ///< why it predicts nothing; empty: it does
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <span>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
+#include "estimator/uncertainty/breaks.hpp"
 #include "estimator/uncertainty/coverage.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/doubtful_levels.hpp"
@@ -33,33 +33,6 @@ VectorXd prior_information(const Settings& settings) {
     VectorXd information(kAll);
     for (std::size_t i = 0; i < kParameters; ++i) information[index(i)] = 1 / (sigma[i] * sigma[i]);
     return information;
-}
-
-/// Dwells after which each run of a plain order ends. An order that returns to a run mixes the
-/// levels, and nobody switches the gyros off at each change of level.
-std::vector<std::size_t> ends_of_runs(const DwellTable& table) {
-    std::vector<std::size_t> ends;
-    std::set<int> begun;
-    for (std::size_t k = 0; k < table.rows.size(); ++k) {
-        if (k > 0 && table.rows[k].run == table.rows[k - 1].run) continue;
-        if (!begun.insert(table.rows[k].run).second) return {};
-        if (k > 0) ends.push_back(k);
-    }
-    return ends;
-}
-
-/// Dwells after which a power cut is likely: where one was seen, and at each end of a run if the
-/// power goes with it.
-std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) {
-    if (drift.power == Power::unbroken) return {};
-    std::set<std::size_t> breaks;
-    if (drift.power == Power::per_run) {
-        for (const std::size_t k : ends_of_runs(table)) breaks.insert(k);
-    }
-    for (std::size_t k = 1; k < table.rows.size(); ++k) {
-        if (table.rows[k].after_power_loss) breaks.insert(k);
-    }
-    return {breaks.begin(), breaks.end()};
 }
 
 std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& settings) {
@@ -166,6 +139,7 @@ Tested tested_with(const Settings& settings, DwellTable table, std::span<const D
 struct TypeB {
     MatrixXd sensitivity;  ///< 30 x m: G z
     MatrixXd covariance;   ///< 30 x 30
+    std::vector<Correlated> correlated;
 };
 
 TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& rates,
@@ -175,6 +149,7 @@ TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& r
     for (Index i = 0; i < rates.cols(); ++i) b.sensitivity.col(i) = all.gain * rates.col(i);
     b.covariance = b.sensitivity * u * b.sensitivity.transpose() +
                    unseen_covariance(settings.uncertainty, all.value, sync_bound);
+    b.correlated = correlated(u);
     return b;
 }
 
@@ -264,6 +239,7 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
         c.u_b = std::sqrt(std::max(0.0, b.covariance(a, a)));
         c.u = std::hypot(c.u_a, c.u_b);
         c.budget = contributions(a, c.u_a, b, out.inputs);
+        add_correlations(b.correlated, c);
         add_unseen(settings.uncertainty, all.value, out.sync_bound, internal, c.budget);
         expand(settings.uncertainty, internal, static_cast<double>(table.dwells() - kOfGyro),
                out.ramps.mean[internal % kGyros], c);
@@ -307,7 +283,7 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         out.drift = of.drift;
         const ForwardModel model(settings, of.coefficients);
         const Inputs declared = without(settings.uncertainty, settings.free);
-        InputSignatures inputs = input_signatures(declared, table, model);
+        InputSignatures inputs = input_signatures(declared, settings.drift, table, model);
         add_skew(table, model, inputs);
         out.inputs = std::move(inputs.list);
         const MatrixXd u = input_covariance(declared, out.inputs);

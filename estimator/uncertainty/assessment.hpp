@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <string>
@@ -24,6 +25,9 @@ struct Contribution {
     Shape shape = Shape::normal;
     double dof = std::numeric_limits<double>::infinity();
     bool declared = false;
+    /// What correlations add to the coefficient's variance, half of each pair's: those with other
+    /// inputs, and with other elements of this one.
+    double with_others = 0, with_own = 0;
 };
 
 /// NaN: not determined, or not declared.
@@ -36,6 +40,12 @@ struct Coefficient {
     double nu_eff = kNone, k = kNone, expanded = kNone;
     double u_use = kNone;              ///< of what it will be after the next switch-on
     std::vector<Contribution> budget;  ///< the largest first
+    double correlation = 0;            ///< u^2 less the squares of the budget's parts
+
+    /// Its root; negative: its square comes off those of the parts.
+    [[nodiscard]] double correlation_part() const {
+        return std::copysign(std::sqrt(std::abs(correlation)), correlation);
+    }
 };
 
 enum class Level { valid, doubtful, not_valid };

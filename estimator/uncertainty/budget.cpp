@@ -6,6 +6,7 @@
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/uncertainty/breaks.hpp"
 #include "estimator/uncertainty/inputs_check.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -83,21 +84,22 @@ void append(InputSignatures& to, InputSignature input, const VectorXd& rates) {
     to.rates.rightCols<1>() = rates;
 }
 
-/// A step of the bias of each gyro at each change of run, about its mean.
-void add_run_steps(const Inputs& inputs, const DwellTable& table, InputSignatures& to) {
+/// A step of the bias of each gyro, about its mean, where the power may have been cut. Who declares
+/// one says that it may go with the run, unless it is stated not to.
+void add_run_steps(const Inputs& inputs, Drift drift, const DwellTable& table,
+                   InputSignatures& to) {
     if (!(inputs.bias_step_between_runs.u > 0)) return;
-    for (Index k = 1; k < table.dwells(); ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        if (table.rows[i].run == table.rows[i - 1].run) continue;
+    if (drift.power == Power::unknown) drift.power = Power::per_run;
+    for (const std::size_t after : breaks_of(table, drift)) {
         VectorXd z = VectorXd::Zero(table.dwells());
-        z.tail(table.dwells() - k).setOnes();
+        z.tail(table.dwells() - static_cast<Index>(after)).setOnes();
         z.array() -= z.mean();
         for (std::size_t j = 0; j < 3; ++j) {
             VectorXd rates = VectorXd::Zero(3 * table.dwells());
             for (Index r = 0; r < table.dwells(); ++r) rates[3 * r + static_cast<Index>(j)] = z[r];
             append(to,
                    {"bias_step_between_runs",
-                    std::string("after dwell ") + std::to_string(k) + ", " + kAxis[j],
+                    "after dwell " + std::to_string(after) + ", " + kAxis[j],
                     inputs.bias_step_between_runs,
                     false,
                     {}},
@@ -114,7 +116,7 @@ std::string joined(const std::string& input, const std::string& element) {
 
 std::string InputSignature::name() const { return joined(input, element); }
 
-InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
+InputSignatures input_signatures(const Inputs& inputs, const Drift& drift, const DwellTable& table,
                                  const ForwardModel& model) {
     InputSignatures out{{}, MatrixXd(3 * table.dwells(), 0)};
     each_input(inputs, [&](const char* key, std::string element, const Declared& declared,
@@ -125,7 +127,7 @@ InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
                 [set, unit](Disturbance& d, double x) { set(d, unit * x); }},
                unit * signature(table, model, set, step));
     });
-    add_run_steps(inputs, table, out);
+    add_run_steps(inputs, drift, table, out);
     return out;
 }
 
@@ -158,6 +160,18 @@ MatrixXd input_covariance(const Inputs& inputs, const std::vector<InputSignature
         u(a, b) = u(b, a) = c.value * std::sqrt(u(a, a) * u(b, b));
     }
     return u;
+}
+
+std::vector<Correlated> correlated(const MatrixXd& covariance) {
+    std::vector<Correlated> list;
+    for (Index a = 0; a < covariance.rows(); ++a) {
+        for (Index b = a + 1; b < covariance.cols(); ++b) {
+            if (covariance(a, b) == 0) continue;
+            list.push_back({static_cast<std::size_t>(a), static_cast<std::size_t>(b),
+                            covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b))});
+        }
+    }
+    return list;
 }
 
 void check(const Inputs& inputs) {

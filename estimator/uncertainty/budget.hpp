@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
@@ -27,8 +28,8 @@ struct InputSignatures {
     std::vector<InputSignature> list;
     Eigen::MatrixXd rates;  ///< of each per unit, 3 n x m
 };
-[[nodiscard]] InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
-                                               const ForwardModel& model);
+[[nodiscard]] InputSignatures input_signatures(const Inputs& inputs, const Drift& drift,
+                                               const DwellTable& table, const ForwardModel& model);
 
 /// What the accelerometers' skew leaves unknown of the vibration's second moment, (pi f tau)^2
 /// relative (DwellRow::relative_error of a sine), in all dwells alike: one input more, none without
@@ -39,5 +40,13 @@ void add_skew(const DwellTable& table, const ForwardModel& model, InputSignature
 /// cannot be correlated so.
 [[nodiscard]] Eigen::MatrixXd input_covariance(const Inputs& inputs,
                                                const std::vector<InputSignature>& list);
+
+/// Two inputs of a list, by their places.
+struct Correlated {
+    std::size_t first = 0, second = 0;
+    double value = 0;  ///< their correlation
+};
+/// Those that a covariance holds.
+[[nodiscard]] std::vector<Correlated> correlated(const Eigen::MatrixXd& covariance);
 
 }  // namespace vibrig::estimator::uncertainty

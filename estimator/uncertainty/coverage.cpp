@@ -65,6 +65,18 @@ void add_unseen(const Inputs& inputs, const VectorXd& value, double sync_bound,
                           std::numeric_limits<double>::infinity(), true});
 }
 
+void add_correlations(const std::vector<Correlated>& inputs, Coefficient& c) {
+    c.correlation = 0;
+    for (const Correlated& pair : inputs) {
+        Contribution &a = c.budget.at(1 + pair.first), &b = c.budget.at(1 + pair.second);
+        const double shared = pair.value * a.sensitivity * a.u * b.sensitivity * b.u;
+        const auto half = a.input == b.input ? &Contribution::with_own : &Contribution::with_others;
+        a.*half += shared;
+        b.*half += shared;
+        c.correlation += 2 * shared;
+    }
+}
+
 void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c) {
     std::stable_sort(c.budget.begin(), c.budget.end(),
                      [](const auto& x, const auto& y) { return x.contribution > y.contribution; });

@@ -23,6 +23,10 @@ namespace vibrig::estimator::uncertainty {
 void add_unseen(const Inputs& inputs, const Eigen::VectorXd& value, double sync_bound,
                 std::size_t internal, std::vector<Contribution>& budget);
 
+/// Sets what correlations add to the variance of a coefficient and to the parts of its budget,
+/// which begins with noise and drift states, then the inputs in their order.
+void add_correlations(const std::vector<Correlated>& inputs, Coefficient& c);
+
 /// Sorts the budget of coefficient `internal`, and sets nu_eff by Welch and Satterthwaite, k,
 /// expanded and u_use, from noise, u_a, u and the budget. `spare`: dwells more than coefficients
 /// fitted to them; `ramp`: mean ramp of the bias in a dwell, deg/h per 100 s.

@@ -71,7 +71,8 @@ std::vector<Leverage> leverages(const Assessment& assessed) {
             }
             if (part.input != "noise and drift states") at->u = std::max(at->u, part.u);
             ratio_sums[static_cast<std::size_t>(at - list.begin())][kind_of(i)] +=
-                part.contribution * part.contribution / (c.u * c.u);
+                (part.contribution * part.contribution + part.with_own + 2 * part.with_others) /
+                (c.u * c.u);
         }
     }
     for (std::size_t l = 0; l < list.size(); ++l) {

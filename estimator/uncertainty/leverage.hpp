@@ -19,7 +19,8 @@ struct Leverage {
     std::string input;
     bool declared = false;
     double u = 0;  ///< of the input, of its largest element, in the unit of its key
-    /// rms over the coefficients of a kind of u without the part over u with it.
+    /// rms over the coefficients of a kind of u without the part, and what is correlated with it,
+    /// over u with it; above 1 where its correlations take more off than it adds.
     std::array<double, kKinds> without{1, 1, 1, 1};
     /// The kind that it shrinks most.
     [[nodiscard]] std::size_t strongest() const;
@@ -28,7 +29,6 @@ struct Leverage {
 };
 
 /// All parts of the budget, what shrinks a kind most first; noise and drift states among them.
-/// Correlations of inputs are not looked at.
 [[nodiscard]] std::vector<Leverage> leverages(const Assessment& assessed);
 
 /// "calibrating the gain ... would make U of the squares 0.75 times what it is".

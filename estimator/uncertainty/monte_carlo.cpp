@@ -21,6 +21,24 @@ using Eigen::VectorXd;
 constexpr int kFewestBlocks = 2, kForLinearity = 200;
 constexpr auto kTogether = static_cast<Index>(kParameters);
 
+/// A draw of unit standard uncertainty.
+double unit_draw(const Declared& of, std::mt19937_64& random) {
+    std::uniform_real_distribution<double> uniform;
+    switch (of.shape) {
+        case Shape::rectangular:
+            return std::sqrt(3.0) * (2 * uniform(random) - 1);
+        case Shape::triangular:
+            return std::sqrt(6.0) * (uniform(random) + uniform(random) - 1);
+        case Shape::arcsine:
+            return std::sqrt(2.0) * std::cos(2 * kPi * uniform(random));
+        case Shape::normal:
+            break;
+    }
+    // JCGM 101, 6.4.9: a finite sample gives a scaled and shifted t-distribution.
+    if (std::isfinite(of.dof)) return std::student_t_distribution<double>(of.dof)(random);
+    return std::normal_distribution<double>()(random);
+}
+
 /// Draws the inputs, in the units of their keys.
 class InputDraws {
   public:
@@ -49,28 +67,11 @@ class InputDraws {
                 ++i;
                 continue;
             }
-            out[i] = u * one_of(input.declared, random);
+            out[i] = u * unit_draw(input.declared, random);
         }
     }
 
   private:
-    /// Of unit standard uncertainty.
-    double one_of(const Declared& of, std::mt19937_64& random) {
-        switch (of.shape) {
-            case Shape::rectangular:
-                return std::sqrt(3.0) * (2 * uniform_(random) - 1);
-            case Shape::triangular:
-                return std::sqrt(6.0) * (uniform_(random) + uniform_(random) - 1);
-            case Shape::arcsine:
-                return std::sqrt(2.0) * std::cos(2 * kPi * uniform_(random));
-            case Shape::normal:
-                break;
-        }
-        // JCGM 101, 6.4.9: a finite sample gives a scaled and shifted t-distribution.
-        if (std::isfinite(of.dof)) return std::student_t_distribution<double>(of.dof)(random);
-        return std::normal_distribution<double>()(random);
-    }
-
     const std::vector<InputSignature>& list_;
     MatrixXd covariance_, root_;
     VectorXd correlated_;
@@ -79,8 +80,9 @@ class InputDraws {
 
 struct DrawModel {
     MatrixXd sensitivity;  ///< 30 x m
-    VectorXd local_g;      ///< per relative change
-    MatrixXd type_a;       ///< root of the covariance
+    Declared gravity;
+    VectorXd local_g;  ///< what its standard uncertainty does
+    MatrixXd type_a;   ///< root of the covariance
     VectorXd value;
     double sync = 0;  ///< half width on the quadratic coefficients
 };
@@ -94,6 +96,7 @@ DrawModel model_of(const Settings& settings, const Assessment& assessed) {
         for (Index j = 0; j < 3; ++j)
             m.value[3 * g + j] = assessed.drift[static_cast<std::size_t>(j)].value[g];
     }
+    m.gravity = settings.uncertainty.local_g;
     m.local_g = settings.uncertainty.local_g.u * per_gravity(m.value);
     if (settings.uncertainty.sync_motion == SyncMotionOf::platform) m.sync = assessed.sync_bound;
     return m;
@@ -110,7 +113,8 @@ MatrixXd draws_of(const DrawModel& model, InputDraws& inputs, int count, std::mt
     for (Index i = 0; i < count; ++i) {
         for (double& one : xi) one = normal(random);
         inputs.draw(random, p);
-        VectorXd here = model.type_a * xi + model.sensitivity * p + normal(random) * model.local_g;
+        VectorXd here = model.type_a * xi + model.sensitivity * p +
+                        unit_draw(model.gravity, random) * model.local_g;
         if (model.sync > 0) {
             for (Index k = 12; k < kTogether; ++k) here[k] += model.sync * uniform(random);
         }

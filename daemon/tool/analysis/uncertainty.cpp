@@ -68,7 +68,8 @@ std::size_t coefficient_number(const std::string& name) {
                              "', expected a name such as D_Fx or D_IIz");
 }
 
-/// Of each kind the parts' rms over it, in units of u: stacked they are 1.
+/// Of each coefficient the parts, squared, over u squared. All of them and the correlations, which
+/// may be below 0, are 1.
 void draw_budget(const uncertainty::Assessment& assessed, const std::string& path) {
     plot::Chart chart;
     chart.title = "Parts of the combined uncertainty";
@@ -91,6 +92,17 @@ void draw_budget(const uncertainty::Assessment& assessed, const std::string& pat
         chart.curves.push_back(std::move(curve));
         if (chart.curves.size() == 6) break;
     }
+    plot::Curve correlations;
+    correlations.name = "correlations";
+    correlations.look = plot::Look::dots;
+    bool any = false;
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto& c = assessed.coefficients[i];
+        any |= c.correlation != 0;
+        correlations.add(static_cast<double>(i + 1),
+                         c.u > 0 ? c.correlation / (c.u * c.u) : uncertainty::kNone);
+    }
+    if (any) chart.curves.push_back(std::move(correlations));
     plot::write_file(path, chart.svg());
 }
 

@@ -14,6 +14,8 @@ using namespace estimator::uncertainty;
 
 /// Parts shown of each coefficient, and pieces of advice.
 constexpr std::size_t kPartsShown = 3, kAdviceShown = 3;
+/// Correlations that are less of u are left out.
+constexpr double kSmallest = 0.05;
 
 /// Elements of one input together.
 std::vector<Contribution> joined_parts(const std::vector<Contribution>& parts) {
@@ -50,6 +52,8 @@ std::string of_all(const Assessment& assessed) {
                      line("%.2g;", part.contribution);
             parts.back() = ' ';
         }
+        if (std::abs(c.correlation_part()) >= kSmallest * c.u)
+            parts += proto::printed("correlations %.2g", c.correlation_part());
         text += line("%-12s %11.6f %10.6f %10.6f %6.2f  %s", estimator::parameter_names()[i],
                      c.value, c.u, c.expanded, c.k, parts.c_str());
     }
@@ -67,6 +71,9 @@ std::string of_one(const Assessment& assessed, std::size_t i) {
         text +=
             line("%-24s %-28s %11.3g %11.3g %12.3g  %s", part.input.c_str(), part.element.c_str(),
                  part.u, part.sensitivity, part.contribution, part.declared ? "" : "not declared");
+    if (c.correlation != 0)
+        text += line("%-24s %-28s %11s %11s %12.3g  %s", "correlations", "of the inputs", "", "",
+                     c.correlation_part(), c.correlation < 0 ? "its square comes off" : "");
     return text;
 }
 

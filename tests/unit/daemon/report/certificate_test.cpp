@@ -70,6 +70,8 @@ TEST_F(Certificate, SaysOnThePageWhatItSaysInJson) {
     replayed_.dwells[0].summary.flagged = true;
     result_["parameters"][0]["budget"] = {{{"input", "encoder_zero"}, {"contribution", 3e-4}},
                                           {{"input", "encoder_zero"}, {"contribution", 4e-4}}};
+    EXPECT_THAT(certificate_page(made()), ::testing::Not(HasSubstr("correlations")));
+    result_["parameters"][0]["correlation_variance"] = -4e-8;
     const Json certificate = made();
     const std::string page = certificate_page(certificate);
     for (const char* words :
@@ -81,7 +83,7 @@ TEST_F(Certificate, SaysOnThePageWhatItSaysInJson) {
         EXPECT_THAT(page, HasSubstr(words));
     EXPECT_THAT(page, HasSubstr("<td>1.000</td><td>0.021</td><td>2.10</td>"));
     EXPECT_THAT(page, HasSubstr("<th>encoder zero</th>"));
-    EXPECT_THAT(page, HasSubstr("<td>D_Fx</td><td>5.0e-04</td>"));
+    EXPECT_THAT(page, HasSubstr("<td>D_Fx</td><td>5.0e-04</td><td>-2.0e-04</td>"));
     EXPECT_EQ(certificate["results"].size(), 30U);
     EXPECT_FALSE(certificate["simulated"]);
     EXPECT_THAT(page, ::testing::Not(HasSubstr("class=\"mark\"")));
@@ -114,6 +116,33 @@ TEST_F(Certificate, OverFrequencySaysOfWhichVibrationACoefficientIs) {
         result_["spectrum"] = spectrum;
         EXPECT_THAT(certificate_page(made()), HasSubstr("coefficients depend on them")) << what;
     }
+}
+
+TEST_F(Certificate, TheMethodNamesTheVibrationOnWhichTheCoefficientsRest) {
+    const auto method = [this] { return made()["method"].get<std::string>(); };
+    const char* const sine = "at rest and under sinusoidal vibration along the vertical,";
+    EXPECT_THAT(method(), HasSubstr(sine));
+    const Json hz{{"hz", 15.0}, {"profile", nullptr}}, floor{{"hz", 48.0}, {"profile", "floor"}};
+    const auto of = [&](const std::vector<Json>& frequencies, int blocks_of_a_sweep) {
+        result_["spectrum"] = {{"model", "flat"}, {"frequencies", frequencies}};
+        result_["spectrum"]["sweeps"] = Json::array();
+        result_["spectrum"]["sweeps"].push_back({{"used", blocks_of_a_sweep}});
+        return method();
+    };
+    EXPECT_THAT(of({hz}, 0), HasSubstr(sine)) << "a sweep of which nothing was used";
+    EXPECT_THAT(of({hz, floor}, 0),
+                HasSubstr("at rest and under sinusoidal and random vibration along the vertical,"));
+    EXPECT_THAT(of({floor, floor}, 0), HasSubstr("at rest and under random vibration"));
+    EXPECT_THAT(of({hz, hz}, 41),
+                HasSubstr("at rest and under sinusoidal and swept-sine vibration"));
+    EXPECT_THAT(of({hz, floor}, 41),
+                HasSubstr("at rest and under sinusoidal, random and swept-sine vibration"));
+    // Two levels, and never at rest.
+    result_.erase("spectrum");
+    for (const double level : {6.36, 4.95}) result_["dwell_rates"].push_back({{"level", level}});
+    EXPECT_THAT(method(), HasSubstr("drift under sinusoidal vibration along the vertical,"));
+    result_["dwell_rates"].push_back({{"level", 0.0}});
+    EXPECT_THAT(method(), HasSubstr(sine));
 }
 
 TEST_F(Certificate, OfADoubtfulResultOrASimulatedRigSaysSoAcrossThePage) {

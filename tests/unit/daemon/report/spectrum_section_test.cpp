@@ -141,6 +141,28 @@ TEST(SpectrumSection, TwoResonancesOfAGyroHaveARowEach) {
     EXPECT_EQ(rows, 3U);
 }
 
+/// Two resonances fitted: 22 coefficients, and four more of ln hz and ln damping in p.
+std::string of_two_fitted(double variance_of_resonances) {
+    SectionJson root = result();
+    SectionJson& one = root["spectrum"]["mixture"][0][0];
+    one["hz"] = {60, 95};
+    one["damping"] = {0.05, 0.05};
+    one["x"] = std::vector<double>(22, 0.01);
+    one["p"] = SectionJson::array();
+    for (std::size_t i = 0; i < 26; ++i) {
+        std::vector<double> row(26, 0.0);
+        row[i] = i < 22 ? 1e-9 : variance_of_resonances;
+        one["p"].push_back(row);
+    }
+    return page_of(root);
+}
+
+TEST(SpectrumSection, TheBandOfTwoResonancesHasTheirFrequenciesAndDampings) {
+    const std::string known = of_two_fitted(0), open = of_two_fitted(1e-3);
+    EXPECT_THAT(open, Not(HasSubstr("cannot be read")));
+    EXPECT_NE(known, open) << "a resonance known to 3 % only widens the band";
+}
+
 TEST(SpectrumSection, AProfileIsNoFrequency) {
     SectionJson random = result();
     random["spectrum"]["frequencies"][1]["profile"] = "floor";

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/spectrum_json.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
 
 namespace vibrig::tool {
@@ -140,6 +143,70 @@ TEST(AssessOverFrequency, MoreDwellsThanItTakesAreSaid) {
     // AND of as many at one frequency nothing is said
     const Assessed one = assessed(estimator::without_apart(rows_of({}, 40)));
     EXPECT_THAT(words_of(one), Not(HasSubstr("at most")));
+}
+
+/// Of a survey: latitude and azimuth known to 300 arcsec each.
+Assessed correlated_sites(double correlation) {
+    const std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    estimator::Settings settings = gain_declared();
+    settings.frequency_hz = 15;
+    settings.uncertainty.latitude_arcsec.u = settings.uncertainty.azimuth_arcsec.u = 300;
+    if (correlation != 0)
+        settings.uncertainty.correlations = {{"latitude", "azimuth", correlation}};
+    estimator::Result result;
+    result.rows = estimator::without_apart(rows);
+    result.observable.fill(true);
+    result.cross_check.done = true;
+    return assess(settings, {}, result, rows, {});
+}
+
+TEST(AssessOverFrequency, ASensitivityDependsOnNoCorrelation) {
+    const Assessed with = correlated_sites(-0.99), without = correlated_sites(0);
+    const auto sensitivity = [](const Assessed& of, std::size_t i, const std::string& input) {
+        for (const auto& part : of.assessed.coefficients[i].budget)
+            if (part.input == input) return part.sensitivity;
+        return 0.0;
+    };
+    // The likeliest hypothesis may be another one in the mixture: 2 %.
+    for (std::size_t i = 1; i < 4; ++i) {
+        for (const char* input : {"latitude", "azimuth"}) {
+            const double stated = sensitivity(without, i, input);
+            EXPECT_NEAR(sensitivity(with, i, input), stated, 0.02 * std::abs(stated) + 1e-8)
+                << input << " " << i;
+        }
+    }
+    // AND parts and correlations add up to u, in the result as well
+    for (const auto& c : with.assessed.coefficients) {
+        double square = c.correlation;
+        for (const auto& part : c.budget) square += part.contribution * part.contribution;
+        EXPECT_NEAR(square / (c.u * c.u), 1, 1e-9);
+        EXPECT_EQ(coefficient_json(c)["correlation_variance"], c.correlation);
+    }
+}
+
+TEST(AssessOverFrequency, APredictionFromTheFileHasTheCorrelations) {
+    const Assessed found = correlated_sites(-0.99);
+    nlohmann::ordered_json root;
+    add_spectrum(*found.spectrum, root);
+    nlohmann::json file = nlohmann::json::parse(root.dump());
+    EXPECT_EQ(file["spectrum"]["effects_correlation"], nlohmann::json::parse("[[0, 1, -0.99]]"));
+    const std::vector<estimator::spectrum::Situation> in{
+        situation_of(six_profiles().front(), {45, 0, 90})};
+    const auto covariance = [&](const estimator::spectrum::Model& model) {
+        return Eigen::MatrixXd(predict(model, in).covariance);
+    };
+    const Eigen::MatrixXd ours = covariance(found.spectrum->analysis.model);
+    EXPECT_LT((covariance(read_model(file, "file")) - ours).norm(), 1e-12 * ours.norm());
+    // A file of earlier versions has none.
+    file["spectrum"].erase("effects_correlation");
+    EXPECT_GT((covariance(read_model(file, "file")) - ours).norm(), 1e-6 * ours.norm());
+    file["spectrum"]["effects_correlation"] = nlohmann::json::parse("[[0, 99, 0.5]]");
+    try {
+        static_cast<void>(read_model(file, "file"));
+        ADD_FAILURE();
+    } catch (const std::runtime_error& error) {
+        EXPECT_THAT(error.what(), HasSubstr("effects_correlation: found [0,99,0.5]"));
+    }
 }
 
 }  // namespace

@@ -148,6 +148,19 @@ TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
         change =
             std::max(change, std::abs(with.coefficients[i].u_b / without.coefficients[i].u_b - 1));
     EXPECT_GT(change, 1e-3);
+    // Parts and correlations add up to u: between two inputs, and two elements of one.
+    settings.uncertainty.correlations.push_back({"encoder_zero.inner", "encoder_zero.outer", -0.7});
+    const Assessment both = of_clean_rig(settings);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const Coefficient& c = both.coefficients[i];
+        double square = c.correlation;
+        for (const Contribution& one : c.budget) square += one.contribution * one.contribution;
+        EXPECT_NEAR(square, c.u * c.u, 1e-9 * c.u * c.u) << i;
+        EXPECT_NE(c.correlation, 0) << i;
+        EXPECT_NEAR(c.correlation_part() * std::abs(c.correlation_part()), c.correlation,
+                    1e-12 * c.u * c.u);
+        EXPECT_EQ(without.coefficients[i].correlation, 0);
+    }
 
     const auto refused = [](std::vector<Correlation> list) {
         Inputs inputs;
@@ -167,6 +180,34 @@ TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
                        {"latitude", "time_base", -0.9}})
                   .find("exclude one another"),
               std::string::npos);
+}
+
+TEST(Budget, AStepBetweenRunsIsDeclaredWhereThePowerMayHaveBeenCutOnly) {
+    const auto elements = [](const std::vector<estimator::testing::PlannedRow>& plan, Power power,
+                             std::size_t lost = 0) {
+        Settings settings;
+        settings.drift.power = power;
+        settings.uncertainty.bias_step_between_runs.u = 0.1;
+        auto rows = theory_rows(settings, plan);
+        if (lost > 0) rows[lost].after_power_loss = true;
+        std::vector<std::string> found;
+        for (const InputSignature& input : assess(settings, result_of(rows)).inputs)
+            if (input.input == "bias_step_between_runs") found.push_back(input.element);
+        return found;
+    };
+    const auto mixed = balanced(6, 14.0 / 3), plain = estimator::testing::sequential(6, 14.0 / 3);
+    const std::vector<std::string> none,
+        half_way{"after dwell 14, x", "after dwell 14, y", "after dwell 14, z"},
+        at_nine{"after dwell 9, x", "after dwell 9, y", "after dwell 9, z"};
+    // Level by level: one place. Who declares a step says that power may be cut there.
+    EXPECT_EQ(elements(plain, Power::per_run), half_way);
+    EXPECT_EQ(elements(plain, Power::unknown), half_way);
+    EXPECT_EQ(elements(plain, Power::unbroken), none);
+    // Nobody switches the gyros off at each change of level of a mixed order.
+    EXPECT_EQ(elements(mixed, Power::per_run), none);
+    EXPECT_EQ(elements(mixed, Power::unknown), none);
+    EXPECT_EQ(elements(mixed, Power::unknown, 9), at_nine) << "a power loss that was seen";
+    EXPECT_EQ(elements(mixed, Power::unbroken, 9), none);
 }
 
 TEST(Budget, ForAnotherPowerOnTheSwitchingOnIsAdded) {

@@ -55,6 +55,23 @@ TEST(MonteCarlo, FindsTheIntervalWhereARectangleDominates) {
     EXPECT_NEAR(half / c.u, 0.95 * std::sqrt(3.0), 0.05);
 }
 
+TEST(MonteCarlo, DrawsLocalGravityFromItsShape) {
+    // GIVEN gravity that is known to 5 % only, rectangular: D_I of 1 deg/h/g is all of it
+    Settings settings;
+    settings.uncertainty.local_g = {0.05, Shape::rectangular};
+    const Clean rig(settings);
+    MonteCarloSettings how;
+    how.most_blocks = 10;
+    SCOPED_TRACE("seed " + std::to_string(how.seed));
+    const MonteCarlo drawn = propagate_distributions(settings, rig.result, rig.assessed, how);
+    // THEN 95 % lie within 0.95 sqrt 3 u, and the budget's 1.96 u is not confirmed
+    EXPECT_FALSE(drawn.coefficients[1].confirmed);
+    const auto& c = rig.assessed.coefficients[1];
+    ASSERT_GT(settings.uncertainty.local_g.u * std::abs(c.value), 0.99 * c.u);
+    const double half = 0.5 * (drawn.coefficients[1].high - drawn.coefficients[1].low);
+    EXPECT_NEAR(half / c.u, 0.95 * std::sqrt(3.0), 0.05);
+}
+
 TEST(MonteCarlo, RefusesWhatWasNotAssessed) {
     EXPECT_THROW(static_cast<void>(propagate_distributions({}, {}, {})), SettingsError);
 }
@@ -83,6 +100,37 @@ TEST(Leverage, NamesThePartThatShrinksTheSquaresMost) {
         ++count;
     }
     EXPECT_NEAR(best->without[2], std::sqrt(sum / count), 0.01);
+}
+
+/// Latitude and azimuth known to 300 arcsec each, correlated.
+Settings correlated_sites(double correlation, double latitude_arcsec = 300) {
+    Settings settings;
+    settings.uncertainty.latitude_arcsec.u = latitude_arcsec;
+    settings.uncertainty.azimuth_arcsec.u = 300;
+    settings.uncertainty.correlations = {{"latitude", "azimuth", correlation}};
+    return settings;
+}
+
+TEST(Leverage, KnowsThatInputsAreCorrelated) {
+    for (const double correlation : {-0.99, 0.6}) {
+        const Clean rig(correlated_sites(correlation)), without(correlated_sites(correlation, 0));
+        const auto list = leverages(rig.assessed);
+        const auto latitude = std::ranges::find(list, std::string("latitude"), &Leverage::input);
+        ASSERT_NE(latitude, list.end());
+        for (std::size_t kind = 0; kind < kKinds; ++kind) {
+            double sum = 0, count = 0;
+            for (std::size_t i = 0; i < kParameters; ++i) {
+                if (kind_of(i) != kind) continue;
+                const double ratio =
+                    without.assessed.coefficients[i].u / rig.assessed.coefficients[i].u;
+                sum += ratio * ratio;
+                ++count;
+            }
+            // THEN without the latitude u is that of a rig whose latitude is certain
+            EXPECT_NEAR(latitude->without[kind], std::sqrt(sum / count), 1e-6)
+                << correlation << " " << kind_name(kind);
+        }
+    }
 }
 
 }  // namespace

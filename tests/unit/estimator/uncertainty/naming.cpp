@@ -57,7 +57,8 @@ Naming naming(const std::vector<PlannedRow>& plan, Misfit misfit,
     ParameterArray truth{};
     for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];
     const uncertainty::ForwardModel model(settings, truth);
-    const auto inputs = uncertainty::input_signatures(settings.uncertainty, table, model);
+    const auto inputs =
+        uncertainty::input_signatures(settings.uncertainty, settings.drift, table, model);
     const VectorXd u =
         uncertainty::input_covariance(settings.uncertainty, inputs.list).diagonal().cwiseSqrt();
     const uncertainty::NullFit fit(table, inputs.rates * u.asDiagonal(), VectorXd::Zero(30));
