@@ -262,7 +262,10 @@ void ControlLoop::watch_emergency_stop(Time now) {
 }
 
 void ControlLoop::on_trip(const rt::Tripped& tripped, Time now) {
-    const std::string text = interlock_.text_of(tripped);
+    // Its stop may be read back before it is told: then it is nobody's else.
+    const std::string guard = tripped.cause == rt::Trip::guard_stop ? "" : outside_.guard_found();
+    const std::string text =
+        interlock_.text_of(tripped) + (guard.empty() ? "" : "; vibrig-guard has found: " + guard);
     latch({interlock_.name_of(tripped),
            text,
            campaign_.armed_by(),

@@ -76,14 +76,8 @@ void ControlLoop::show(Time now) {
     if (commissioning_.active()) status_.reason = commissioning_.progress();
     status_.interlock.latches = latches_.open();
     status_.noise = dwells_.noise();
-    outside_.armed(!campaign_.armed_by().empty(), highest_level());
-}
-
-double ControlLoop::highest_level() const {
-    if (campaign_.armed_by().empty()) return 0;
-    const auto& campaign = configuration_.campaign;
-    if (status_.state == CampaignState::checking) return campaign.loop.table_g;
-    return campaign.table_g.empty() ? 0 : *std::ranges::max_element(campaign.table_g);
+    const bool armed = !campaign_.armed_by().empty();
+    outside_.armed(armed, armed ? campaign_.highest_seen() : 0);
 }
 
 void ControlLoop::watch_outside() {

@@ -34,6 +34,10 @@ class ControlLoop {
     /// What is latched of it, to people outside.
     void announce_latches();
 
+    /// Before the shaker's thread begins: where a rig must be proven and nobody has tried whether
+    /// the controller's registers are what the configuration calls them, nothing but a stop is
+    /// written.
+    void hold_untried_registers();
     /// The thread's body: until everything is at rest after shut_down(), or give_up().
     void run();
 
@@ -64,8 +68,6 @@ class ControlLoop {
         events_.log(severity, source, text);
     }
     void show(drivers::Time now);
-    /// The highest level that is armed, peak at the table; 0: nothing is.
-    [[nodiscard]] double highest_level() const;
     void watch_outside();
     void record_begin(const std::string& by, std::size_t dwells_before);
     /// Instruments whose certificate has run out, for whoever arms.

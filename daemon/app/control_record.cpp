@@ -33,6 +33,15 @@ std::string ControlLoop::registers_not_tried() const {
         .lacks(commission::TriedRegisters::keys_of(loaded_));
 }
 
+void ControlLoop::hold_untried_registers() {
+    if (!first_shaking()) return;
+    const auto why = registers_not_tried();
+    if (why.empty()) return;
+    campaign_.hold_writes();
+    log(Severity::warning, "shaker",
+        "nothing but a stop is written to the controller, its watchdog is not fed: " + why);
+}
+
 /// At the start: what was written to the controller meanwhile, without a daemon.
 void ControlLoop::keep_trials() {
     try {

@@ -60,6 +60,7 @@ void Daemon::start() {
     control_.announce_latches();
     // A daemon that died may have left it running inside the watchdog's time.
     parts_.shaker->stop_now();
+    control_.hold_untried_registers();
     watch_shaker();
     start_acquisition();
     start_shaker();

@@ -65,6 +65,11 @@ std::string Outside::refuses(const CommandRequest& request) const {
     return {};
 }
 
+std::string Outside::guard_found() const {
+    const auto cause = guard_link_ ? guard_link_->finding() : proto::GuardCause::none;
+    return cause == proto::GuardCause::none ? "" : proto::text_of(cause);
+}
+
 void Outside::watch(bool tripped, bool alarm) {
     bool lost = false;
     auto cause = proto::GuardCause::none;

@@ -34,6 +34,8 @@ class Outside {
     void watch(bool tripped, bool alarm);
     /// Why the guard lets nothing be armed; empty: it does.
     [[nodiscard]] std::string refuses(const CommandRequest& request) const;
+    /// What the guard has found and nobody has acknowledged; empty: nothing.
+    [[nodiscard]] std::string guard_found() const;
     /// What the guard has found was seen by a person.
     void acknowledge();
     /// For the guard: by a named person, up to this level, peak at the table; 0: nothing is.

@@ -89,7 +89,7 @@ bool Campaign::done(Time now) const { return shutting_down_ && !active() && !sto
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
-    ports_.rig.shaker.read_only(state == State::commissioning);
+    ports_.rig.shaker.read_only(writes_held_ || state == State::commissioning);
     if (state == State::paused) ports_.rig.gimbal.forget_position();
     excitation_.for_whom(highest_level(), state != State::checking);
     if (state == State::ramping) excitation_.place(here().stop.position_deg);

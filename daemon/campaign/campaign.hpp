@@ -80,7 +80,14 @@ class Campaign {
     /// The next proof goes up from 0.03 g, each rung held against the command before the next:
     /// nobody has seen yet what this shaker makes of a number.
     void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
+    /// Before the first step(): nothing but a stop is written to the shaker's controller in this
+    /// life.
+    void hold_writes() noexcept;
     CommandReply command(const CommandRequest& request, drivers::Time now);
+    /// The highest level that the arming is for, peak at the table, as somebody measures it who
+    /// takes the platform's motion for the table's by the reference frequency's transmission:
+    /// where a plan's other vibration gets through better he sees more.
+    [[nodiscard]] double highest_seen() const;
     /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
     /// another command.
     [[nodiscard]] std::string refusal(const CommandRequest& request, drivers::Time now) const;
@@ -281,6 +288,7 @@ class Campaign {
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
+    bool writes_held_ = false;
     bool slew_ordered_ = false;  ///< within slew()
     std::size_t positions_done_ = 0;
     std::size_t positions_before_ = 0;  ///< of them before a restart

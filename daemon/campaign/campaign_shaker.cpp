@@ -2,6 +2,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/stages/small_level.hpp"
@@ -19,6 +20,27 @@ double Campaign::highest_level() const {
     for (const auto& [table_g, kind] : levels_)
         highest_g = std::max(highest_g, kind < 0 ? 3 * table_g : table_g);
     return highest_g;
+}
+
+double Campaign::highest_seen() const {
+    const auto& rig = settings_.rig;
+    const double reference =
+        rig.transmission * std::sqrt(rig.accelerometer_response.power(rig.frequency_hz));
+    double highest_g = 0, largest = 1;
+    for (const Stop& stop : settings_.stops) {
+        double shown = stop.transmission;
+        for (const double along : stop.along) shown = std::max(shown, along);
+        const double ratio = std::max(1.0, shown / reference);
+        largest = std::max(largest, ratio);
+        highest_g = std::max(highest_g, (stop.random ? 3 : 1) * stop.table_g * ratio);
+    }
+    const bool whole = state_ == State::checking || settings_.stops.empty();
+    return whole ? largest * highest_level() : highest_g;
+}
+
+void Campaign::hold_writes() noexcept {
+    writes_held_ = true;
+    ports_.rig.shaker.read_only(true);
 }
 
 void Campaign::watch_stop(Time now) {

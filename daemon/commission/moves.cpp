@@ -147,9 +147,11 @@ std::string Procedure::contradiction(const Look& seen) const {
     double asked = 0;
     for (std::size_t k = 0; k < 3; ++k)
         asked = std::max(asked, std::abs(legs_.front()[k] - travel_[k]));
-    const double most =
-        (careful_ && asked <= 2 ? std::min(3 * asked, 5.0) : 3 * asked) + kRocks_deg;
-    if (const double turned = turned_deg(seen.force, before_.force); turned > most)
+    // Nothing that is not known yet goes far; a way back, which is longer, is known.
+    constexpr double kCareful_deg = 5;
+    const bool careful = careful_ && asked < kCareful_deg;
+    const double most = careful ? std::min(3 * asked, kCareful_deg) : 3 * asked;
+    if (const double turned = turned_deg(seen.force, before_.force); turned > most + kRocks_deg)
         return fmt::format("gravity turned by {:.1f} deg, {:.2f} commanded", turned, asked);
     const Vec3 angle = unwrapped(seen.angle, before_.angle);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -158,7 +160,7 @@ std::string Procedure::contradiction(const Look& seen) const {
             return fmt::format("{} moved by {:.2f} when commanded where it is", names_.angle[c],
                                change);
         const bool own = moving_slot_ < 3 && channel_of_[moving_slot_] == c;
-        if (ratio_[c] != 0 && change > std::abs(ratio_[c]) * (3 * asked + 0.5) + 10 * noise_[c])
+        if (ratio_[c] != 0 && change > std::abs(ratio_[c]) * (most + 0.5) + 10 * noise_[c])
             return fmt::format("{} moved by {:.4g}, {:.4g} expected", names_.angle[c], change,
                                std::abs(ratio_[c]) * asked);
         if (careful_ && moving_slot_ < 3 && channel_of_[moving_slot_] < 3 && !own &&

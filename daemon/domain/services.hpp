@@ -39,8 +39,9 @@ struct GuardStatus {
     std::string socket;  ///< empty: none is configured
     bool heard = false;  ///< a word came within its deadline
     std::string note;    ///< why not
-    std::string cause;   ///< what it found, "none" without; as last heard
-    std::string text;    ///< in words
+    // Of what follows nothing is known while it is not heard.
+    std::string cause;  ///< what it found, "none" without
+    std::string text;   ///< in words
     bool disobeyed = false, sees = false, rest = false, reaches_shaker = false,
          horn_confirms = false;
     double table_g = 0;  ///< peak at the table, by its own measurement

@@ -43,8 +43,10 @@ bool Judge::hangs(const Moment& now, const proto::DaemonWord& word) noexcept {
 GuardCause Judge::find(const Evidence& e, const Moment& now) noexcept {
     const bool silent = e.word ? drivers::to_seconds(e.now - e.heard) > safety::kHeartbeatDeadline_s
                                : drivers::to_seconds(e.now - started_->wall) > kFirstWord_s;
-    // A daemon that died has armed nothing any more, once the table is seen to rest.
-    forgotten_ = silent && (forgotten_ || quiet_.for_s(rests_, now, kForget_s));
+    // A daemon that died has armed nothing any more, once the table is seen to rest; rest of before
+    // does not count.
+    const bool quiet = quiet_.for_s(silent && rests_, now, kForget_s);
+    forgotten_ = silent && (forgotten_ || quiet);
     const bool allowed = e.word && (e.word->armed || e.word->excitation) && !forgotten_;
     const bool hanging = e.word && hangs(now, *e.word) && !silent;
     if (allowed && !silent) allowed_ = now;

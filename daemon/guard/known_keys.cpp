@@ -74,6 +74,16 @@ const std::set<std::string>& keys_of_the_daemon() {
         "site.azimuth_deg",
         "site.elevation_deg",
         "site.latitude_deg",
+        "spectrum.controller_gain",
+        "spectrum.controller_psd",
+        "spectrum.elastic_beyond",
+        "spectrum.highest_hz",
+        "spectrum.mode",
+        "spectrum.pads_damping",
+        "spectrum.sweep_begins_s",
+        "spectrum.sweep_rate_tolerance",
+        "spectrum.tolerance_deg_h",
+        "spectrum.transmission",
         "vibration.frequency_hz",
         "vibration.level_window_s",
     });
@@ -82,10 +92,9 @@ const std::set<std::string>& keys_of_the_daemon() {
 
 const std::set<std::string>& tables_of_the_daemon() {
     static const std::set<std::string> names{
-        "archive",   "campaign",    "drift",     "estimator", "gimbal", "instrument",
-        "interlock", "journal",     "levelling", "log",       "mqtt",   "noise",
-        "platform",  "profile",     "record",    "selftest",  "server", "spectrum",
-        "threads",   "uncertainty", "unit",      "zeroing"};
+        "archive", "campaign",  "drift",  "estimator", "gimbal",      "instrument", "interlock",
+        "journal", "levelling", "log",    "mqtt",      "noise",       "platform",   "profile",
+        "record",  "selftest",  "server", "threads",   "uncertainty", "unit",       "zeroing"};
     return names;
 }
 

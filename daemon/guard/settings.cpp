@@ -121,7 +121,9 @@ void read_witness(Keys& keys, WitnessSettings& w) {
     }
     w.table = keys.text("can.signals.table_accel", w.table);
     keep_place("can.signals.table_accel");
-    w.transmission = keys.number("vibration.transmission", w.transmission, 0.001, 10);
+    // With nothing between them it is 1, stated or not.
+    const bool hard = keys.choice("spectrum.mount", 0, {"isolated", "hard"}) == 1;
+    w.transmission = keys.number("vibration.transmission", hard ? 1 : w.transmission, 0.001, 10);
     w.seen = read_seen(keys);
     keys.numbers("accelerometer.zero_g", w.zero_g.data(), 3);
     for (std::size_t i = 0; i < 3; ++i)

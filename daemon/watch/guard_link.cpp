@@ -156,6 +156,7 @@ GuardStatus GuardLink::status() const {
     status.note = status.heard    ? std::string()
                   : note_.empty() ? "no word within its deadline"
                                   : note_;
+    if (!status.heard) return status;  // what it said last it may not say any more
     status.cause = proto::name_of(word_.cause);
     status.text = word_.cause == proto::GuardCause::none ? "" : proto::text_of(word_.cause);
     status.disobeyed = word_.disobeyed;

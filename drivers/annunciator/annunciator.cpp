@@ -174,12 +174,14 @@ void Annunciator::page(Time now) {
 void Annunciator::run() {
     Time horn_due = 0;
     for (;;) {
+        // Somebody is paged before the horn is reached: its name may have to be looked up, which
+        // takes as long as the resolver wants.
+        if (command_) page(steady_now());
         const Time now = steady_now();
         if (horn_ && now >= horn_due) {
             sound(now);
             horn_due = horn_->next(steady_now());
         }
-        if (command_) page(steady_now());
         std::unique_lock lock(mutex_);
         const auto woken = [&] {
             return quit_ || (horn_ && pattern_ != shown_) ||

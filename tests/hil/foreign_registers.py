@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 
 from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
 from pymodbus.device import ModbusDeviceIdentification
@@ -336,12 +337,34 @@ def not_stated(checks, programs):
     checks.equal(controller.written(), 0, "and nothing is written to it")
 
 
+def not_tried(checks, programs):
+    """Stated, and nobody has tried whether they are that: a daemon writes nothing but a stop into them."""
+    controller = Controller(False)
+    controller.rest()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, "seqpacket", "real", folder)
+        rig.modbus_port = int(controller.where.rpartition(":")[2])
+        rig.configure({"name": "foreign"}, commission={"simulated": False, "folder": os.path.join(folder, "commission")},
+                      **{"shaker.registers." + role: keys for role, keys in STATED.items()})
+        daemon = rig.daemon = r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], folder)
+        try:
+            status = rig.wait_for(lambda s: s["shaker"]["link"] == "running" and not s["shaker"].get("stop_pending"), 30)
+            checks.check(status is not None, "not tried: the daemon reads it, and its stop is written", rig.logs())
+            time.sleep(2)   # four periods of the watchdog
+        finally:
+            code = daemon.end()
+        log = daemon.text()
+    checks.equal(controller.holding.places, {RAMP, RUN}, "not tried: a stop is written, no feed and no timeout")
+    checks.check(code == 0 and "nothing but a stop is written to the controller, its watchdog is not fed: " in log, "not tried: which it says", log)
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
     for line in (False, True):
         found_by_reading(checks, programs, line)
     not_stated(checks, programs)
+    not_tried(checks, programs)
     for line in (False, True):
         tried(checks, programs, line)
     not_as_stated(checks, programs)

@@ -47,6 +47,8 @@ void save_file(const std::string& path, const std::string& before, const std::st
 
 /// Before anything is written or asked.
 void expect_two(const CommissionOptions& options) {
+    if (options.second.empty())
+        throw std::runtime_error("--second: found nothing, expected another person");
     if (const auto why = commission::not_two(options.by, options.second); !why.empty())
         throw CommissionRefused(why);
 }

@@ -58,6 +58,27 @@ TEST_F(ArmingTest, NamesEachFrequencyOnceAndTheHardMount) {
                 HasSubstr("up to 3 g at the table at 15, 85.1 Hz, platform bolted hard to it,"));
 }
 
+TEST_F(ArmingTest, SaysWhatOneSeesWhoKnowsTheReferenceTransmissionAlone) {
+    settings.rig.transmission = 0.5;
+    const auto seen = [this](const Stop& stop) {
+        settings.stops = {{{}, 1.5}, stop};
+        remake();
+        return campaign->highest_seen();
+    };
+    EXPECT_DOUBLE_EQ(seen({{}, 2}), 2);
+    EXPECT_DOUBLE_EQ(seen({{}, 2, 60, false, 0.1}), 2) << "less of it shows, the table tells";
+    EXPECT_DOUBLE_EQ(seen({{}, 1, 8, false, 1.25}), 2.5) << "the platform moves 2.5 times as much";
+    Stop sweep{{}, 1};
+    sweep.sweep = {8, 60, 100};
+    sweep.along = {1.5, 1, 0.2};
+    EXPECT_DOUBLE_EQ(seen(sweep), 3);
+    Stop random{{}, 1.19, 0, false, 0.5};
+    random.random.emplace();
+    random.random->set_point.profile = 1;
+    EXPECT_DOUBLE_EQ(seen(random), 3 * 1.19) << "peaks, as the arming says";
+    EXPECT_THAT(order(Kind::arm).message, HasSubstr("up to 3.57 g"));
+}
+
 TEST_F(ArmingTest, SaysThatNoUnitIsStated) {
     EXPECT_THAT(order(Kind::arm).message, HasSubstr("armed for a unit that is not stated, plan"));
 }

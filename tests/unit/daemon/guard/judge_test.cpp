@@ -105,6 +105,23 @@ TEST(Judge, ADaemonThatFallsSilentWhileTheTableMovesIsFoundWithinItsDeadline) {
     EXPECT_EQ(world.judge.tune(), Tune::stop);
 }
 
+TEST(Judge, RestOfBeforeDoesNotForgetAnArming) {
+    // GIVEN a guard that watched a rig at rest before the daemon came
+    World world;
+    world.talks = false;
+    ASSERT_EQ(world.pass(20), -1);
+    world.talks = true;
+    world.arm(9);
+    ASSERT_EQ(world.pass(5), -1);
+    // WHEN the daemon dies, armed, the table at rest a moment and then seen by nobody
+    world.talks = false;
+    ASSERT_EQ(world.pass(safety::kHeartbeatDeadline_s + 1), -1);
+    world.blind();
+    // THEN that it rested long before is no reason to forget what was armed
+    EXPECT_GE(world.pass(2), 0);
+    EXPECT_EQ(world.judge.cause(), GuardCause::daemon_silent);
+}
+
 TEST(Judge, ADaemonThatFallsSilentAtRestIsNoDanger) {
     World world;
     ASSERT_EQ(world.pass(5), -1);

@@ -107,6 +107,12 @@ command_limit_s = 20
 )");
 }
 
+TEST(GuardSettings, AreTheDaemonsOwnOfAHardMount) {
+    const auto hard = kGuard + "[spectrum]\nmount = \"hard\"\n";
+    expect_agreement(hard);
+    EXPECT_EQ(parse_settings(hard, "rig.toml").witness.transmission, 1);
+}
+
 /// |A| at the reference frequency: Butterworth, or straight on logarithmic scales between two rows.
 TEST(GuardSettings, KnowWhatTheAccelerometersSee) {
     const auto seen = [](const std::string& text) {

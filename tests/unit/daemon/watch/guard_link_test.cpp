@@ -153,6 +153,9 @@ TEST_F(GuardLinkTest, AGuardThatGoesIsMissedAndFoundAgain) {
             if (!word) return false;
             proto::GuardWord answer;
             answer.sequence = word->sequence;
+            answer.cause = proto::GuardCause::over_level;
+            answer.rest = answer.sees = answer.reaches_shaker = true;
+            answer.table_g = 1;
             guard.say(answer);
             return link_.heard();
         };
@@ -162,6 +165,9 @@ TEST_F(GuardLinkTest, AGuardThatGoesIsMissedAndFoundAgain) {
     EXPECT_TRUE(until([&] { return !link_.heard(); }));
     EXPECT_THAT(link_.status().note, HasSubstr("@" + name_ + ": "));
     EXPECT_EQ(link_.finding(), proto::GuardCause::none);
+    const GuardStatus status = link_.status();
+    EXPECT_TRUE(status.cause.empty() && status.text.empty() && status.table_g == 0);
+    EXPECT_FALSE(status.rest || status.sees || status.reaches_shaker);
 }
 
 TEST_F(GuardLinkTest, TheLastWordIsSaidBeforeItEnds) {
