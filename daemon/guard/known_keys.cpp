@@ -1,8 +1,36 @@
 #include "daemon/guard/known_keys.hpp"
 
+#include <sstream>
+#include <utility>
+
 namespace vibrig::guard {
 
 namespace {
+
+/// Table, and the names in it.
+constexpr std::pair<const char*, const char*> kKeys[] = {
+    {"accelerometer", "bandwidth_hz order range_g response skew_ms"},
+    {"can", "join_deadline_ms samples_per_frame stale_deadline_ms"},
+    {"can.signals",
+     "azimuth azimuth_valid command_echo fault gyros_at_speed "
+     "in_position inner inner_valid loop_closed message_sync_signal "
+     "outer outer_valid ready slewing sync_count temperature "
+     "temperature_case temperature_gyro_x temperature_gyro_y "
+     "temperature_gyro_z"},
+    {"commission",
+     "buttons certificate enforce folder linear_sigma opening_check "
+     "stop_s valid_days"},
+    {"shaker",
+     "backoff_max_ms backoff_min_ms baud device plate poll_period_ms "
+     "response_timeout_ms watchdog_period_ms"},
+    {"shaker.limits", "displacement_mm velocity_mps"},
+    {"site", "azimuth_deg elevation_deg latitude_deg"},
+    {"spectrum",
+     "controller_gain controller_psd elastic_beyond highest_hz mode "
+     "pads_damping sweep_begins_s sweep_rate_tolerance tolerance_deg_h "
+     "transmission"},
+    {"vibration", "frequency_hz level_window_s"},
+};
 
 std::set<std::string> registers(std::set<std::string> names) {
     const std::string table = "shaker.registers.";
@@ -24,70 +52,15 @@ std::set<std::string> registers(std::set<std::string> names) {
 }  // namespace
 
 const std::set<std::string>& keys_of_the_daemon() {
-    static const std::set<std::string> names = registers({
-        "accelerometer.bandwidth_hz",
-        "accelerometer.order",
-        "accelerometer.range_g",
-        "accelerometer.response",
-        "accelerometer.skew_ms",
-        "can.join_deadline_ms",
-        "can.samples_per_frame",
-        "can.signals.azimuth",
-        "can.signals.azimuth_valid",
-        "can.signals.command_echo",
-        "can.signals.fault",
-        "can.signals.gyros_at_speed",
-        "can.signals.in_position",
-        "can.signals.inner",
-        "can.signals.inner_valid",
-        "can.signals.loop_closed",
-        "can.signals.message_sync_signal",
-        "can.signals.outer",
-        "can.signals.outer_valid",
-        "can.signals.ready",
-        "can.signals.slewing",
-        "can.signals.sync_count",
-        "can.signals.temperature",
-        "can.signals.temperature_case",
-        "can.signals.temperature_gyro_x",
-        "can.signals.temperature_gyro_y",
-        "can.signals.temperature_gyro_z",
-        "can.stale_deadline_ms",
-        "commission.buttons",
-        "commission.certificate",
-        "commission.enforce",
-        "commission.folder",
-        "commission.linear_sigma",
-        "commission.opening_check",
-        "commission.stop_s",
-        "commission.valid_days",
-        "shaker.backoff_max_ms",
-        "shaker.backoff_min_ms",
-        "shaker.baud",
-        "shaker.device",
-        "shaker.limits.displacement_mm",
-        "shaker.limits.velocity_mps",
-        "shaker.plate",
-        "shaker.poll_period_ms",
-        "shaker.response_timeout_ms",
-        "shaker.watchdog_period_ms",
-        "site.azimuth_deg",
-        "site.elevation_deg",
-        "site.latitude_deg",
-        "spectrum.controller_gain",
-        "spectrum.controller_psd",
-        "spectrum.elastic_beyond",
-        "spectrum.highest_hz",
-        "spectrum.mode",
-        "spectrum.pads_damping",
-        "spectrum.sweep_begins_s",
-        "spectrum.sweep_rate_tolerance",
-        "spectrum.tolerance_deg_h",
-        "spectrum.transmission",
-        "vibration.frequency_hz",
-        "vibration.level_window_s",
-    });
-    return names;
+    static const std::set<std::string> all = [] {
+        std::set<std::string> names;
+        for (const auto& [table, list] : kKeys) {
+            std::istringstream words(list);
+            for (std::string name; words >> name;) names.insert(table + ("." + name));
+        }
+        return registers(std::move(names));
+    }();
+    return all;
 }
 
 const std::set<std::string>& tables_of_the_daemon() {

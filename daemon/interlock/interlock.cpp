@@ -70,8 +70,8 @@ void Interlock::command(double table_g, const std::array<double, 3>& position_de
 void Interlock::trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept {
     const Tripped mine{cause, static_cast<std::uint8_t>(row), channel, ++trips_,
                        static_cast<float>(value)};
-    // Who sees the trip finds its stop ordered, however long this thread is away in between. To order
-    // it twice, where two causes come at once, stops no less.
+    // Who sees the trip finds its stop ordered, however long this thread is away in between. To
+    // order it twice, where two causes come at once, stops no less.
     shaker_.stop_now();
     Tripped other = tripped_.load();
     do {

@@ -22,10 +22,10 @@ struct AnnunciatorSettings {
 };
 
 struct AnnunciatorStatus {
-    bool horn = false;      ///< there is one
-    bool confirms = true;   ///< it reads back as commanded
-    std::string horn_note;  ///< why not
-    HornPattern pattern = HornPattern::none;  ///< that this is said of
+    bool horn = false;                                     ///< there is one
+    bool confirms = true;                                  ///< it reads back as commanded
+    std::string horn_note;                                 ///< why not
+    HornPattern pattern = HornPattern::none;               ///< that this is said of
     bool command = false;                                  ///< there is one
     std::uint64_t started = 0, failed = 0, timed_out = 0;  ///< runs of it
     std::uint64_t left_out = 0;                            ///< not run: too many waited

@@ -16,6 +16,7 @@
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 #include "proto/option_value.hpp"
 
@@ -155,7 +156,8 @@ int run_file(const Options& options) {
 
 void write_increments(const Options& options, const zeros::CalibrationSettings& s,
                       const zeros::UnitErrors& errors) {
-    std::ofstream out(options.write);
+    proto::OutputFile file(options.write);
+    std::ofstream out(file.place());
     out << "time_s,turn_x_arcsec,turn_y_arcsec,turn_z_arcsec,dv_x_mps,dv_y_mps,dv_z_mps,azimuth_"
            "deg\n"
         << std::setprecision(15);
@@ -172,6 +174,7 @@ void write_increments(const Options& options, const zeros::CalibrationSettings& 
     if (!out) {
         throw std::runtime_error(options.write + ": cannot be written");
     }
+    file.finish();
 }
 
 int run_simulate(const Options& options) {
@@ -265,7 +268,8 @@ void add_zero(CLI::App& app, int& exit_code) {
          {std::pair{"--y-up", &options->y_up}, std::pair{"--y-down", &options->y_down}}) {
         command
             ->add_option(name, *file,
-                         "the same unit with platform y vertical, turned about it; azimuth of z")
+                         std::string("the same unit with platform y ") + (name + 4) +
+                             ", turned about it; azimuth of z")
             ->excludes("--inverted");
     }
     command->footer(
