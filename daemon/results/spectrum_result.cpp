@@ -91,9 +91,9 @@ void tell_coefficients(const SpectrumResult& spectrum, const uncertainty::Inputs
         uncertainty::add_correlations(of.model.correlated, c);
         uncertainty::add_unseen(inputs, of.value, to.sync_bound, internal, c.budget);
         const std::size_t j = internal % estimator::kGyros;
-        uncertainty::expand(inputs, internal,
-                            static_cast<double>(spectrum.table.dwells() - fitted(spectrum, j)),
-                            to.ramps.mean[j], c);
+        uncertainty::expand(
+            inputs, internal, static_cast<double>(spectrum.table.dwells() - fitted(spectrum, j)),
+            uncertainty::growth_in_dwell(to.ramps.mean[j], spectrum.table.rows()), c);
         for (std::size_t k = 0; k < kParameters; ++k) {
             const auto b = static_cast<Index>(estimator::internal_of(k));
             if (!std::isfinite(to.coefficients[k].u)) continue;
@@ -148,7 +148,11 @@ double SpectrumResult::at_hz(std::size_t parameter) const {
     const std::size_t internal = estimator::internal_of(parameter);
     // Bias and linear terms know no frequency.
     const bool linear = internal / estimator::kGyros < estimator::kDii;
-    return linear || analysis.gyros[internal % estimator::kGyros].resonant() ? 0 : reference_hz;
+    // Nor does a compromise between frequencies that differ belong to one of them.
+    const bool compromise = analysis.form == Form::flat && analysis.flat.alarm;
+    return linear || compromise || analysis.gyros[internal % estimator::kGyros].resonant()
+               ? 0
+               : reference_hz;
 }
 
 bool SpectrumResult::same_at_all() const {
@@ -223,9 +227,14 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
               "over frequency nothing is freed: an error in what estimator.free names is in the "
               "coefficients",
               uncertainty::Level::not_valid);
-    if (of.flat.alarm && of.form != Form::resonance)
-        doubt(assessed, "quadratic coefficients depend on the frequency (p = " +
-                            std::to_string(of.flat.p) + " that they do not)");
+    if (of.flat.alarm && of.form != Form::resonance) {
+        const bool compromise = of.form == Form::flat;
+        doubt(assessed,
+              "quadratic coefficients depend on the frequency (p = " + std::to_string(of.flat.p) +
+                  " that they do not)" +
+                  (compromise ? ": one for all of them is that of none of them" : ""),
+              compromise ? uncertainty::Level::not_valid : uncertainty::Level::doubtful);
+    }
     if (!of.model.refusal.empty()) doubt(assessed, of.model.refusal);
 }
 

@@ -213,8 +213,7 @@ void put_together(const SpectralTable& table, const MatrixXd& declared_effect, A
     out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
 }
 
-/// Sets what each declared input does to each gyro's coefficients. Of the 30 together: this times
-/// its transpose is their covariance. `gains`: from the rates to a gyro's coefficients.
+/// Sets what each declared input does to each gyro's coefficients; a root of the 30's covariance.
 MatrixXd add_effects(const std::array<MatrixXd, 3>& gains, const DeclaredRates& declared,
                      Analysis& out) {
     const Index m = declared.rates.cols();

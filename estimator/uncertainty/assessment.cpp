@@ -242,7 +242,7 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
         add_correlations(b.correlated, c);
         add_unseen(settings.uncertainty, all.value, out.sync_bound, internal, c.budget);
         expand(settings.uncertainty, internal, static_cast<double>(table.dwells() - kOfGyro),
-               out.ramps.mean[internal % kGyros], c);
+               growth_in_dwell(out.ramps.mean[internal % kGyros], table.rows), c);
         widening.push_back(c.u_a / c.sigma);
     }
     out.widening = widening.empty() ? 1 : median(widening);

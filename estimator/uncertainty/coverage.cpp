@@ -15,17 +15,20 @@ using Eigen::VectorXd;
 
 namespace {
 
+/// A ramp is stated per so much.
+constexpr double kRampSpan_s = 100;
+
 /// Where these terms begin, filter order.
 constexpr auto kOfLinear = static_cast<Index>(internal_index(kDi, 0)),
                kOfQuadratic = static_cast<Index>(internal_index(kDii, 0));
 
-void use_again(const Inputs& in, std::size_t internal, double ramp, Coefficient& c) {
+void use_again(const Inputs& in, std::size_t internal, double growth, Coefficient& c) {
     // Stays NaN while nobody has said how it repeats.
     if (!in.turn_on_bias || !in.turn_on_linear) return;
     const std::size_t group = internal / kGyros;
     double square = c.u * c.u;
     if (group == kDt) {
-        const Declared seen{std::abs(ramp) / 2 / std::sqrt(3.0)};
+        const Declared seen{std::abs(growth) / 2 / std::sqrt(3.0)};
         for (const Declared& one : {*in.turn_on_bias, in.ramp_in_dwell.value_or(seen)})
             square += one.u * one.u;
     } else if (group <= kDo) {
@@ -77,7 +80,14 @@ void add_correlations(const std::vector<Correlated>& inputs, Coefficient& c) {
     }
 }
 
-void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c) {
+double growth_in_dwell(double ramp, std::span<const DwellRow> rows) {
+    double sum_s = 0;
+    for (const DwellRow& row : rows) sum_s += row.duration_s;
+    return rows.empty() ? 0 : ramp * sum_s / static_cast<double>(rows.size()) / kRampSpan_s;
+}
+
+void expand(const Inputs& inputs, std::size_t internal, double spare, double growth,
+            Coefficient& c) {
     std::stable_sort(c.budget.begin(), c.budget.end(),
                      [](const auto& x, const auto& y) { return x.contribution > y.contribution; });
     const double rho = std::min(1.0, c.noise * c.noise / (c.u_a * c.u_a));
@@ -89,7 +99,7 @@ void expand(const Inputs& inputs, std::size_t internal, double spare, double ram
     c.nu_eff = sum > 0 ? std::pow(c.u, 4) / sum : std::numeric_limits<double>::infinity();
     c.k = student_quantile(inputs.coverage, std::max(1.0, std::floor(c.nu_eff)));
     c.expanded = c.k * c.u;
-    use_again(inputs, internal, ramp, c);
+    use_again(inputs, internal, growth, c);
 }
 
 }  // namespace vibrig::estimator::uncertainty

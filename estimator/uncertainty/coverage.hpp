@@ -2,9 +2,11 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "estimator/filter/declared.hpp"
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 /// What makes of a coefficient's parts its U: for coefficients at one frequency and over several.
@@ -29,8 +31,12 @@ void add_correlations(const std::vector<Correlated>& inputs, Coefficient& c);
 
 /// Sorts the budget of coefficient `internal`, and sets nu_eff by Welch and Satterthwaite, k,
 /// expanded and u_use, from noise, u_a, u and the budget. `spare`: dwells more than coefficients
-/// fitted to them; `ramp`: mean ramp of the bias in a dwell, deg/h per 100 s.
+/// fitted to them; `growth`: of the bias from a dwell's begin to its end, deg/h.
 /// docs/theory/uncertainty.md.
-void expand(const Inputs& inputs, std::size_t internal, double spare, double ramp, Coefficient& c);
+void expand(const Inputs& inputs, std::size_t internal, double spare, double growth,
+            Coefficient& c);
+
+/// By how much the bias grows in a dwell of mean length, deg/h: `ramp` in deg/h per 100 s.
+[[nodiscard]] double growth_in_dwell(double ramp, std::span<const DwellRow> rows);
 
 }  // namespace vibrig::estimator::uncertainty

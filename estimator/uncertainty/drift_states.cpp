@@ -114,10 +114,14 @@ std::vector<Weighted> hypotheses(const GyroRates& gyro, const Drift& drift, doub
     return list;
 }
 
+/// The noise that the rates are known to, deg/h, in which sizes are counted: of equal dwells that
+/// of each. A dwell that was cut short knows next to nothing and must not set it for the others.
+double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseInverse().mean()); }
+
 /// What the covariances of all hypotheses are made of.
 struct Kernels {
     explicit Kernels(const GyroRates& gyro)
-        : s0(std::sqrt(gyro.variance.mean())), time(normalised_time(gyro.time_h)) {
+        : s0(unit_of(gyro.variance)), time(normalised_time(gyro.time_h)) {
         const Index n = gyro.dwells();
         const double span = gyro.time_h[n - 1] - gyro.time_h[0];
         elapsed =

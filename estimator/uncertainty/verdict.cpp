@@ -125,8 +125,8 @@ std::string words_of_state(const Assessment& a, const Evidence& e) {
                 e.elements[i].c_str(), e.size[i], e.sigma[i]);
         }
         default:
-            return text("gyro noise is %.2f +- %.2f times what is configured", e.size[0],
-                        e.sigma[0]);
+            return text("the rates scatter %.2f +- %.2f times as configured: gyro noise, or angles",
+                        e.size[0], e.sigma[0]);
     }
 }
 
@@ -314,19 +314,22 @@ std::string smallest_seen(const Assessment& a) {
     std::string out;
     for (const Evidence& e : a.evidence) {
         if (e.pattern != Pattern::azimuth && e.pattern != Pattern::cross_axis) continue;
+        // What is determined beside the coefficients is no misfit that could hide.
+        if (std::ranges::any_of(a.freed, [&e](const FreedUnknown& one) {
+                return one.of_class == name_of(e.pattern);
+            }))
+            continue;
+        out += out.empty() ? ", smallest misfit seen with 90 %: " : ", ";
         out += e.pattern == Pattern::azimuth
-                   ? text("%sazimuth %.1f arcmin", out.empty() ? "" : ", ", e.smallest_seen)
-                   : text("%smotion across the vertical %.1f %%", out.empty() ? "" : ", ",
-                          100 * e.smallest_seen);
+                   ? text("azimuth %.1f arcmin", e.smallest_seen)
+                   : text("motion across the vertical %.1f %%", 100 * e.smallest_seen);
     }
     return out;
 }
 
 std::string sentence_of(const Assessment& a, const Verdict& verdict) {
     if (verdict.level == Level::valid)
-        return text("valid: %d degrees of freedom, p = %.2g, smallest misfit seen with 90 %%: ",
-                    a.degrees, a.p) +
-               smallest_seen(a) +
+        return text("valid: %d degrees of freedom, p = %.2g", a.degrees, a.p) + smallest_seen(a) +
                (a.over_frequency ? text("; over frequency: %zu dwells", a.rates.size()) : "");
     return std::string(word_of(verdict.level)) + ", because " + verdict.reasons.front().text;
 }
@@ -381,7 +384,14 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     } else {
         add_dwells(result, Noticed::innovations, list);
         add_cross_check(result.cross_check, list);
-        if (settings.method == Method::joint) add_chi_square(a, list);
+        if (settings.method == Method::joint) {
+            add_chi_square(a, list);
+        } else {
+            list.push_back({"not tested",
+                            "the two-step route tests nothing: neither drift nor misfit shows, and "
+                            "there is no uncertainty",
+                            Level::doubtful});
+        }
     }
     conclude(a, verdict);
     return verdict;

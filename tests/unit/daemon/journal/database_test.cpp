@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 namespace vibrig::journal {
@@ -40,6 +42,28 @@ TEST_F(DatabaseTest, HoldsLittleOfAFileHoweverMuchIsReadOfIt) {
         // megabyte. SQLite itself would take 2 MB.
         EXPECT_LT(::sqlite3_memory_highwater(0) - before, 1 << 19) << "of 8 MB";
     }
+}
+
+TEST_F(DatabaseTest, OfSomebodyElseIsRefusedUnchanged) {
+    const auto sum = [this] {
+        std::ifstream file(path, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(file), {});
+    };
+    const std::string before = sum();
+    EXPECT_NO_THROW(refuse_foreign(path.string(), {"chain", "event"}));
+    EXPECT_NO_THROW(refuse_foreign(path.string() + "-none", {"event"}));
+    try {
+        refuse_foreign(path.string(), {"file"});
+        FAIL();
+    } catch (const DatabaseError& error) {
+        EXPECT_FALSE(error.damaged()) << "it would be replaced";
+        EXPECT_EQ(std::string(error.what())
+                      .find(path.string() + ": found a database without a "
+                                            "table file"),
+                  0U)
+            << error.what();
+    }
+    EXPECT_EQ(sum(), before);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "daemon/record/dwells_csv.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/index.hpp"
+#include "daemon/record/raw_log.hpp"
 #include "daemon/record/replay.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "tests/unit/daemon/record/parts.hpp"
@@ -178,10 +180,28 @@ TEST_F(RawSegments, ThatAreMissingAreNamed) {
     EXPECT_EQ(recover(folder_.string(), nothing).at(0).missing_raw.size(), 1U);
 }
 
+TEST_F(RawSegments, ThatAreCutOffAreNamed) {
+    ASSERT_EQ(compress(segment(2)), "");
+    EXPECT_THAT(missing(), ::testing::IsEmpty());
+    // A concatenation of logs is one, too.
+    std::ostringstream frame;
+    frame << std::ifstream(segment(2) + ".zst", std::ios::binary).rdbuf();
+    std::ofstream(segment(2) + ".zst", std::ios::app | std::ios::binary) << frame.str();
+    const auto whole = fs::file_size(segment(2) + ".zst");
+    EXPECT_FALSE(is_cut(segment(2) + ".zst"));
+    // WHEN its last byte is gone, or all of them
+    for (const auto size : {whole - 1, whole / 2 + 3, std::uintmax_t{3}, std::uintmax_t{0}}) {
+        fs::resize_file(segment(2) + ".zst", size);
+        EXPECT_THAT(missing(),
+                    ::testing::ElementsAre("the end of raw-0002.log.zst: the file is cut off"))
+            << size;
+    }
+    EXPECT_EQ(recover(folder_.string(), [](const auto&) {}).at(0).missing_raw.size(), 1U);
+}
+
 TEST_F(RawSegments, ThatLieThereAreLeftOutAndNotMissing) {
     // GIVEN segments as an archive has them, and one that is gone
-    fs::rename(segment(1), segment(1) + ".zst");
-    fs::rename(segment(3), segment(3) + ".zst");
+    ASSERT_EQ(compress(segment(1)) + compress(segment(3)), "");
     fs::remove(segment(2));
     // WHEN one is read THEN those that lie there are distinguished from the one that does not
     EXPECT_THAT(left_out(folder_.string(), {segment(3) + ".zst"}),

@@ -31,7 +31,8 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
     const auto counts = recorder.samples().counts();
     ASSERT_GT(counts.dropped, 0U);
     // WHEN it begins to look: what was there before the campaign is not of it, so once more
-    recorder.sign_with([](std::uint64_t entry) { return std::optional("head of " + std::to_string(entry)); });
+    recorder.sign_with(
+        [](std::uint64_t entry) { return std::optional("head of " + std::to_string(entry)); });
     recorder.start();
     while (recorder.samples().counts().popped < counts.pushed) ::usleep(1000);
     for (std::size_t i = 0; i < 100; ++i) {

@@ -15,6 +15,7 @@ namespace {
 
 using namespace estimator::spectrum::testing;
 using estimator::DwellRow;
+using estimator::spectrum::Form;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -35,7 +36,7 @@ std::vector<DwellRow> rows_of(const Truth& truth, std::size_t surveys) {
     return rows;
 }
 
-Assessed assessed(const std::vector<DwellRow>& rows) {
+Assessed assessed(const std::vector<DwellRow>& rows, Form form = Form::automatic) {
     estimator::Settings settings = gain_declared();
     settings.frequency_hz = 15;
     settings.drift.power = estimator::uncertainty::Power::unbroken;
@@ -43,7 +44,7 @@ Assessed assessed(const std::vector<DwellRow>& rows) {
     result.rows = estimator::without_apart(rows);
     result.observable.fill(true);
     result.cross_check.done = true;
-    return assess(settings, {}, result, rows, {});
+    return assess(settings, {}, result, rows, {}, form);
 }
 
 /// Largest distance from the static coefficients of the rig, in u.
@@ -85,6 +86,20 @@ TEST(AssessOverFrequency, ACampaignHasTheStaticCoefficientsOfARigThatResonates) 
     }
     EXPECT_EQ(all.assessed.rates.size(), rows.size());
     EXPECT_NE(all.assessed.coefficients[4].value, one.assessed.coefficients[4].value);
+}
+
+TEST(AssessOverFrequency, OneForAllOfARigThatResonatesIsOfNoFrequencyAndNotValid) {
+    const auto flat = assessed(rows_of(Truth::common(0.5, kSixty), 1), Form::flat);
+    ASSERT_TRUE(flat.spectrum && flat.spectrum->analysis.flat.alarm);
+    EXPECT_EQ(flat.spectrum->at_hz(4), 0);
+    EXPECT_EQ(flat.assessed.verdict.level, estimator::uncertainty::Level::not_valid);
+    EXPECT_THAT(flat.assessed.verdict.sentence, HasSubstr("is that of none of them"));
+    // of a rig that does not, it is of each
+    const auto even = assessed(rows_of(Truth::common(0, kSixty), 1), Form::flat);
+    ASSERT_TRUE(even.spectrum && !even.spectrum->analysis.flat.alarm);
+    EXPECT_EQ(even.spectrum->at_hz(4), 15);
+    EXPECT_NE(even.assessed.verdict.level, estimator::uncertainty::Level::not_valid)
+        << even.assessed.verdict.sentence;
 }
 
 TEST(AssessOverFrequency, WhatCountsDwellsCountsThemAll) {
@@ -207,6 +222,82 @@ TEST(AssessOverFrequency, APredictionFromTheFileHasTheCorrelations) {
     } catch (const std::runtime_error& error) {
         EXPECT_THAT(error.what(), HasSubstr("effects_correlation: found [0,99,0.5]"));
     }
+}
+
+/// What read_model says of a file with this at a place of its `spectrum`.
+std::string refusal_of(nlohmann::json file, const std::string& place, const nlohmann::json& value) {
+    file["spectrum"][nlohmann::json::json_pointer(place)] = value;
+    try {
+        static_cast<void>(read_model(file, "file"));
+    } catch (const std::runtime_error& error) {
+        return error.what();
+    }
+    return "taken";
+}
+
+TEST(ModelFile, WhatNoResultCanSayIsRefusedByItsKey) {
+    // GIVEN a result as it is written
+    nlohmann::ordered_json root;
+    add_spectrum(*correlated_sites(0).spectrum, root);
+    const nlohmann::json file = nlohmann::json::parse(root.dump());
+    ASSERT_EQ(refusal_of(file, "/lowest_hz", 15.0), "taken");
+    struct Case {
+        const char* place;
+        const char* value;
+        const char* said;
+    };
+    // WHEN one value in it is impossible THEN its key, what it is and what it should be are said
+    for (const auto& [place, value, said] : {
+             Case{"/mixture/0/0/p/4/4", "-1",
+                  "file: spectrum.mixture[0][0].p[4][4]: found -1, expected a variance of 0"},
+             Case{"/mixture/0/0/p/4/5", "1e3", "p[5][4]: found"},
+             Case{"/mixture/0/0/p", "[[1]]", "[0].p: found 1 entries, expected "},
+             Case{"/mixture/0/0/p", "[]", "[0].p: found 0 entries, expected "},
+             Case{"/mixture/0/0/p", "7", "[0].p: found 7, expected a list of "},
+             Case{"/mixture/0/0/p/3", "[1, 2]", "[0].p[3]: found 2 entries, expected "},
+             Case{"/mixture/0/0/p/3/3", "null", "[0].p[3][3]: found null, expected a number"},
+             Case{"/mixture/0/0/x/4", "1e200", "[0].x[4]: found 1e+200, expected a number"},
+             Case{"/mixture/0/0/x/4", "\"1\"", "[0].x[4]: found \"1\", expected a number"},
+             Case{"/mixture/0/0/x", "[1, 2]", "[0].x: found 2 entries, expected "},
+             Case{"/mixture/0/0/w", "1e300", "[0].w: found 1e+300, expected a number from 0 to 1"},
+             Case{"/mixture/0/0/w", "0", "mixture[0]: found weights w of sum "},
+             Case{"/mixture/0", "[]", "mixture[0]: found [], expected a list of hypotheses"},
+             Case{"/mixture", "[]", "mixture: found 0 entries, expected 3"},
+             Case{"/platform/up", "\"+q\"", "platform.up: found \"+q\", expected an axis"},
+             Case{"/platform/gyro_axes/0", "[\"+x\", \"+x\", \"+z\"]",
+                  "platform.gyro_axes[0]: found [\"+x\",\"+x\",\"+z\"], expected x, y and z once"},
+             Case{"/platform/gyro_axes/0/1", "\"*y\"", "gyro_axes[0][1]: found \"*y\""},
+             Case{"/platform/elevation_deg", "1e9",
+                  "platform.elevation_deg: found 1000000000.0, expected a number from -2 to 2"},
+             Case{"/platform/elevation_deg", "\"0\"",
+                  "elevation_deg: found \"0\", expected a number"},
+             Case{"/lowest_hz", "\"low\"", "file: spectrum.lowest_hz: found \"low\", expected"},
+             Case{"/lowest_hz", "1e4", "spectrum.highest_hz: found "},
+             Case{"/highest_hz", "1e9", "spectrum.highest_hz: found 1000000000.0, expected"},
+             Case{"/effects/0/change/0", "[1]", "effects[0].change[0]: found 1 entries, expected "},
+             Case{"/effects/0/input", "5", "effects[0].input: found 5, expected a text"},
+             Case{"/effects_correlation", "[[0, \"1\", 2]]", "effects_correlation: found [0,"},
+             Case{"/refusal", "5", "spectrum.refusal: found 5, expected a text or null"},
+         }) {
+        const std::string found = refusal_of(file, place, nlohmann::json::parse(value));
+        EXPECT_THAT(found, HasSubstr(said)) << place;
+        EXPECT_THAT(found, Not(HasSubstr("json.exception"))) << place;
+    }
+}
+
+TEST(ModelFile, ACovarianceThatNoDataCanHaveIsRefused) {
+    // GIVEN three coefficients whose pairs are possible, and all three together are not
+    nlohmann::ordered_json root;
+    add_spectrum(*correlated_sites(0).spectrum, root);
+    nlohmann::json file = nlohmann::json::parse(root.dump());
+    nlohmann::json& p = file["spectrum"]["mixture"][0][0]["p"];
+    for (std::size_t i = 0; i < p.size(); ++i) {
+        for (std::size_t j = 0; j < p.size(); ++j)
+            p[i][j] = i == j ? 1.0 : i < 3 && j < 3 ? -0.9 : 0.0;
+    }
+    EXPECT_THAT(refusal_of(file, "/lowest_hz", 15.0),
+                HasSubstr("mixture[0][0].p: found correlations with an eigenvalue of -0.8, "
+                          "expected a positive semidefinite covariance"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <random>
 
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
@@ -217,6 +218,41 @@ TEST(Campaigns, ARestartWithPowerLostIsABreakWhereAStepIsAsLikelyAsNot) {
     // AND whoever states that the power was on all the time is believed
     EXPECT_DOUBLE_EQ(stepped(size, true, Power::unbroken).step.weight,
                      stepped(size, false, Power::unbroken).step.weight);
+}
+
+TEST(Campaigns, ADwellThatWasCutShortChangesNothingForTheOthers) {
+    for (std::uint64_t seed = 31; seed <= 50; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Rows rows = estimator::testing::theory_rows({}, balanced(kFirst, kSecond));
+        Random random(seed);
+        add_noise(rows, random);
+        const Assessment whole = assess({}, estimator::testing::result_of(rows));
+        // GIVEN one dwell more, of 2 s: it knows next to nothing, and its rate is its noise
+        DwellRow stub = rows.front();
+        const double shorter = std::pow(100.0 / 2.0, 3);  // angle noise, spec 2
+        stub.run = 3;
+        stub.duration_s = 2;
+        stub.middle_s = rows.back().middle_s + 100;
+        mapped(stub.variance) *= shorter;
+        mapped(stub.ramp_variance) *= shorter;
+        rows.push_back(stub);
+        // THEN each u is what it was: the unit of the drift's sizes is 1/29 of its square larger,
+        // and with one dwell more the weights move as little
+        const Assessment with = assess({}, estimator::testing::result_of(rows));
+        for (std::size_t i = 0; i < kParameters; ++i)
+            EXPECT_NEAR(with.coefficients[i].u / whole.coefficients[i].u, 1, 0.1) << i;
+    }
+}
+
+TEST(Campaigns, OfTheTwoStepRouteNothingIsTestedAndNothingCalledValid) {
+    Settings settings;
+    settings.method = Method::two_step;
+    const Assessment a = assess(
+        settings, estimator::testing::result_of(theory_rows(settings, balanced(kFirst, kSecond))));
+    EXPECT_FALSE(a.done);
+    EXPECT_EQ(a.verdict.level, Level::doubtful);
+    EXPECT_NE(a.verdict.sentence.find("the two-step route tests nothing"), std::string::npos)
+        << a.verdict.sentence;
 }
 
 TEST(CampaignsSoak, OfAThousandCleanOnesTenAreNotValidAtMost) {

@@ -108,5 +108,15 @@ TEST(Coverage, AnotherPowerOnAddsItsOwnScatterToBiasAndLinearTerms) {
     EXPECT_NEAR(u_use(kDt, 0.6), std::hypot(u, 0.3), 1e-12);
 }
 
+TEST(Coverage, ARampGrowsAsLongAsTheDwellLasts) {
+    std::vector<DwellRow> rows(2);
+    EXPECT_EQ(growth_in_dwell(0.3, {}), 0);
+    for (DwellRow& row : rows) row.duration_s = 100;
+    EXPECT_DOUBLE_EQ(growth_in_dwell(0.3, rows), 0.3) << "it is stated per 100 s";
+    rows[0].duration_s = 500;
+    EXPECT_DOUBLE_EQ(growth_in_dwell(0.3, rows), 0.9);
+    EXPECT_DOUBLE_EQ(growth_in_dwell(-0.3, rows), -0.9);
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::uncertainty

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -78,6 +79,22 @@ TEST_F(Freed, ALatitudeThatIsOffIsFoundAndNoLongerMovesTheCoefficients) {
 }
 
 // The gain's spread over noise is what the covariance says, and the value follows from it.
+TEST_F(Freed, IsNoMisfitThatCouldHide) {
+    auto rows = clean;
+    std::mt19937_64 random(3);
+    estimator::testing::add_noise(rows, random);
+    const auto sentence = [&](std::vector<Misfit> free) {
+        Settings with = settings;
+        with.free = std::move(free);
+        return assess(with, estimator::testing::result_of(rows)).verdict.sentence;
+    };
+    const auto none = sentence({}), azimuth = sentence({Misfit::azimuth});
+    ASSERT_EQ(azimuth.rfind("valid: ", 0), 0U) << azimuth;
+    EXPECT_NE(none.find("seen with 90 %: azimuth "), std::string::npos) << none;
+    EXPECT_EQ(azimuth.find("azimuth"), std::string::npos) << azimuth;
+    EXPECT_NE(azimuth.find("seen with 90 %: motion across"), std::string::npos) << azimuth;
+}
+
 TEST_F(Freed, TheEstimatorIsLinearInTheRates) {
     settings.free = {Misfit::azimuth, Misfit::cross_axis};
     settings.drift.model = BiasModel::constant;
