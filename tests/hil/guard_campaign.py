@@ -17,6 +17,7 @@ import threading
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import random_campaign as rc  # noqa: E402
 import rig as r  # noqa: E402
 import service_manager as stages  # noqa: E402
 
@@ -67,7 +68,7 @@ class Coils:
 class Guarded(r.Rig):
     """A rig with a guard, horn and pager; the pager keeps what it gets."""
 
-    def __init__(self, programs, folder, *faults, clock="real"):
+    def __init__(self, programs, folder, *faults, clock="real", truth=None):
         super().__init__(programs, "seqpacket", clock, folder, poll_s=0.1)
         self.guard = None
         self.meeting = os.path.join(folder, "guard.sock")
@@ -77,7 +78,7 @@ class Guarded(r.Rig):
             file.write(f"#!/bin/sh\ncat >>{self.pages}\nexec sleep 1000\n")   # it hangs as well
         os.chmod(pager, 0o755)
         self.coils = Coils()
-        self.start_plant(*WARM, *faults)
+        self.start_plant(*WARM, *faults, *(("--truth", self.truth_file(truth)) if truth else ()))
         self.be_punctual()
         self.pager = pager
         self.arrange()
@@ -431,6 +432,35 @@ def fast(checks, programs, folder):
         rig.stop()
 
 
+def mixed(checks, programs, folder):
+    """Random vibration beside a lower sine, on a hard mount whose transmission nobody states: what was armed is what is seen."""
+    what = "random on a hard mount"
+    rig = Guarded(programs, folder, clock="rig", truth=rc.TRUTH)
+    try:
+        plan, count = rc.plan_of(folder, 1)
+        with open(plan, encoding="utf-8") as file:
+            runs = json.load(file)["runs"]
+        runs[0].update(table_g=1.0, level_g=1.0)
+        with open(plan, "w", encoding="utf-8") as file:
+            json.dump({"runs": runs}, file)
+        rig.configure({"name": "mixed", "plan": plan, "dwell_s": 20.0, "temperature_window_s": 5.0, "identify": "what-it-can"},
+                      spectrum={"mount": "hard", "mode": "mixed"}, guard={"socket": rig.meeting},
+                      **{f"shaker.registers.{role}": keys for role, keys in rc.REGISTERS.items()})
+        with open(rig.configuration, "a", encoding="utf-8") as file:
+            file.write(rc.CONFIGURATION)
+        rig.start_guard()
+        rig.start_daemon()
+        status = rig.wait_for(watching, SOON)
+        checks.check(status is not None and watching(status), f"{what}: daemon and guard have found each other", rig.logs())
+        arms_and_starts(checks, rig, what)
+        status = rig.wait_for_state(rc.ENDS, 8 * SOON)
+        checks.check(status is not None and status["campaign"]["state"] == "finished" and len(status["campaign"]["dwells"]) == count,
+                     f"{what}: the campaign finishes", r.state_of(status) + rig.logs())
+        checks.check("alarm:" not in rig.guard.text(), f"{what}: the guard finds nothing", rig.logs())
+    finally:
+        rig.stop()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -438,7 +468,7 @@ def main():
                  broken("SIGKILL", killed, by_hand, "daemon_silent"),
                  lies("it says idle, all well", 0, 0.0, 5.0, "unarmed_motion"),
                  lies("armed for 2 g, it does 5 g", 3, 2.0, 5.0, "over_level"), disobeyed, stuck_witness,
-             fast)
+             fast, mixed)
     if "--part" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             parts[int(sys.argv[sys.argv.index("--part") + 1])](checks, programs, folder)
