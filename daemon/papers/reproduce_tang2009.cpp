@@ -188,23 +188,44 @@ void demand(Reproduction& table, const std::string& item, const Drawn& of, Side 
               printed("at %s %.4g", most ? "most" : "least", limit), std::move(values));
 }
 
-/// What theory foretells of the joint filter: the mean square of its errors is the bound's. What
-/// was drawn may lie 3.29 standard deviations on either side (99.9 %).
-void demand_theory(Reproduction& table, const std::string& item, const Drawn& drawn,
-                   double theory) {
-    const double band = 3.29 * *drawn.chance;
+/// Degrees of freedom of the chi-square that square_sum() has from seed to seed, by its mean and
+/// variance (Welch, Satterthwaite): the coefficients correlate, and weigh differently.
+double degrees_of(const Outcome& outcome, const Group& group) {
+    double mean = 0, square = 0;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            if (std::min(i % 10, j % 10) < group.first || std::max(i % 10, j % 10) > group.last)
+                continue;
+            const double relative = outcome.covariance[i][j] / (truth()[i] * truth()[j]);
+            if (i == j) mean += relative;
+            square += relative * relative;
+        }
+    }
+    return mean * mean / square;
+}
+
+/// What theory foretells of the joint filter: the mean square of its errors is the bound's, and
+/// strays from it as a chi-square of `degrees`, those of all seeds together.
+void demand_theory(Reproduction& table, const std::string& item, const Drawn& drawn, double theory,
+                   double degrees) {
+    const auto end = [&](double probability) {
+        return theory *
+               std::sqrt(estimator::allan::chi_square_quantile(probability, degrees) / degrees);
+    };
+    const double least = end(0.0005), most = end(0.9995);
     table.add(item + ", rms relative error, %, against theory", "-",
               printed("%.4g +- %.2g", drawn.value, *drawn.chance),
-              std::abs(drawn.value - theory) <= band,
-              printed("%.4g, within %.2g (99.9 %%)", theory, band),
+              least <= drawn.value && drawn.value <= most,
+              printed("%.4g: %.3g to %.3g (99.9 %%)", theory, least, most),
               {{"computed", drawn.value},
                {"sigma", *drawn.chance},
                {"theory", theory},
-               {"at_least", theory - band},
-               {"at_most", theory + band}});
+               {"at_least", least},
+               {"at_most", most}});
 }
 
-/// The paper's table is one draw, and may be as far from the mean of ours as one of them (99.7 %).
+/// The paper's table is one draw, and may be as far from the mean of ours as one of them (99.7 % of
+/// Student's t, whose square is F with one degree of freedom above).
 void demand_published(Reproduction& table, const Study& study, tang2009::Route route,
                       std::size_t trial, const Group& group) {
     const auto n = static_cast<double>(study.seeds.size());
@@ -216,7 +237,8 @@ void demand_published(Reproduction& table, const Study& study, tang2009::Route r
     }
     const double spread = std::sqrt(std::max(0.0, square - mean * mean) * n / std::max(1.0, n - 1));
     const double published = rms(kTable2[trial], group);
-    const double band = 3 * spread * std::sqrt(1 + 1 / n);
+    const double t = std::sqrt(estimator::allan::f_quantile(0.997, 1, n - 1));
+    const double band = t * spread * std::sqrt(1 + 1 / n);
     table.add(levels(study) + printed(": trial %zu, two-step, %s, rms relative error, %%, "
                                       "against the paper's one draw",
                                       trial + 1, group.name),
@@ -227,13 +249,15 @@ void demand_published(Reproduction& table, const Study& study, tang2009::Route r
 
 void add_two_sided(const Study& stated, const Study& doubled, Reproduction& table) {
     using enum tang2009::Route;
+    const auto n = static_cast<double>(stated.seeds.size());
     for (const Study* study : {&stated, &doubled}) {
         for (const auto& [what, route, bound] :
              {std::tuple{": trial 1, joint, ", kJoint1, &study->bound},
               std::tuple{": trial 2, joint, ", kJoint2, &study->bound_trial_2}}) {
             for (const Group& group : {kAll, kBias, kLinear, kSquares, kProducts}) {
                 demand_theory(table, levels(*study) + what + group.name,
-                              drawn_rms(*study, route, group), 100 * relative_rms(*bound, group));
+                              drawn_rms(*study, route, group), 100 * relative_rms(*bound, group),
+                              n * degrees_of(study->seeds.front()[route], group));
             }
         }
     }

@@ -100,6 +100,7 @@ struct Follower {
         identification.solved(estimate);  // also of what is not determined
         outcome.value = estimate.value;
         outcome.sigma = estimate.sigma;
+        outcome.covariance = result.covariance;
         outcome.nees = nees(result);
         outcome.nis = result.nis_per_dof;
         outcome.correlation_square = correlation_of(result).squaredNorm();

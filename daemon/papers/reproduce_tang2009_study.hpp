@@ -25,6 +25,7 @@ enum Route : std::size_t {
 
 struct Outcome {
     Coefficients value{}, sigma{};
+    std::array<Coefficients, estimator::kParameters> covariance{};  ///< NaN: not determined
     double nees = 0;  ///< of the 30 coefficients; NaN where they are not all determined
     double nis = 0;   ///< mean per degree of freedom
     /// Sum of the squared correlations between all coefficients; 30: none correlate.

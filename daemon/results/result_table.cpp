@@ -70,13 +70,19 @@ std::string verdict(const Assessment& assessed) {
     return text;
 }
 
+/// Without a line near the nominal frequency it is at rest only where nothing vibrates.
+std::string frequency(const estimator::RunAmplitude& run) {
+    if (run.frequency_hz > 0) return number("%.4f", run.frequency_hz);
+    return run.at_rest() ? "at rest" : "no line";
+}
+
 std::string amplitude_lines(const estimator::Result& result) {
     std::string text = line("%-12s %12s %11s  %12s %12s", "run", "amplitude g", "sigma g", "kappa",
                             "frequency Hz");
     for (const estimator::RunAmplitude& run : result.amplitudes) {
         text += line("%-12d %12s %11s  %12s %12s", run.run, number("%.6f", run.amplitude_g).c_str(),
                      number("%.2g", run.sigma_g).c_str(), number("%.6f", run.kappa).c_str(),
-                     run.frequency_hz > 0 ? number("%.4f", run.frequency_hz).c_str() : "at rest");
+                     frequency(run).c_str());
     }
     return text;
 }

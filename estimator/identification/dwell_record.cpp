@@ -187,6 +187,7 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     // As measured, where that is known: the nominal one may be off.
     const double nominal_hz = r.info.frequency_hz > 0 ? r.info.frequency_hz : settings.frequency_hz;
     const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : nominal_hz;
+    const bool aliases = !random && s.kappa > 1.0 && r.period_s > 0;
     if (r.samples == 0) {
         flag("no samples", true);
     } else if (2 * r.locked > r.samples) {
@@ -204,23 +205,26 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     } else if (!random && r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
         // The level lags behind by its window: second-order terms would take up the difference.
         flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
-    } else if (!random && s.kappa > 1.0 && r.period_s > 0 &&
-               VibrationLevel::excluded(nominal_hz, r.period_s, window_s)) {
+    } else if (aliases && VibrationLevel::excluded(nominal_hz, r.period_s, window_s)) {
         flag(
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
             "rejected",
             true);
+    } else if (aliases && VibrationLevel::excluded(frequency_hz, r.period_s, window_s)) {
+        flag("the vibration is too close to a multiple of half the sample rate: dwell rejected",
+             true);
     } else if (r.info.frequency_hz > 0 && !random &&
                (s.frequency_hz > 0 ? std::abs(s.frequency_hz - nominal_hz) > kOffFrequency_hz
                                    : s.kappa > kShaken)) {
         flag("the vibration is not at its commanded frequency within 0.05 Hz: dwell rejected",
              true);
     } else if (const char* alias =
-                   !random && s.kappa > 1.0 && r.period_s > 0
-                       ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s)
-                       : "";
+                   aliases ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s) : "";
                *alias != '\0') {
         flag(alias, false);
+    } else if (!random && s.kappa > kShaken && !(s.frequency_hz > 0)) {
+        flag("the vibration is not found near vibration.frequency_hz: aliasing cannot be judged",
+             false);
     } else if (r.stuck > 0) {
         flag("a resolver stood still", false);
     } else if (r.played && r.played->word == PlayedRandom::Word::not_read) {

@@ -17,6 +17,8 @@ constexpr double kLongestPause_s = 1.0;
 constexpr double kMostMissing = 20'000;
 /// So many stamps in a row before the newest accepted one mean that that one was wrong.
 constexpr int kBadTimesBeforeRestart = 5;
+/// Of kappa by eq. 13: what it is off by, all quadratic coefficients are.
+constexpr double kPaperTolerance = 0.01;
 constexpr auto kBufferCapacity =
     static_cast<std::size_t>(VibrationLevel::kFirstWindow_s * VibrationLevel::kHighestRate_hz) + 1;
 
@@ -426,6 +428,21 @@ void Identification::Impl::end_stretch() noexcept {
     primed_ = false;
 }
 
+/// The two-step route's own level is what its coefficients have; the measured one tells whether it
+/// is right. Its noise and the accelerometers' errors stay far below the limit.
+void Identification::Impl::take_paper_level(DwellSummary& s) const noexcept {
+    const bool off = std::abs(paper_.kappa() - s.kappa) > kPaperTolerance * s.kappa;
+    if (off && !swept_ && (!s.flagged || s.followed)) {
+        s.flagged = true;
+        s.followed = false;
+        s.reason =
+            "kappa by eq. 13 is more than 1 % off the measured one: the two-step route needs the "
+            "exact vibration.frequency_hz, whole blocks of samples and no harmonic";
+    }
+    s.kappa = paper_.kappa();
+    s.amplitude_g = paper_.amplitude_g();
+}
+
 DwellSummary Identification::Impl::end_dwell(bool cut_short) noexcept {
     if (!in_dwell_) return {};
     record_.cut_short = cut_short;
@@ -438,10 +455,7 @@ DwellSummary Identification::Impl::end_dwell(bool cut_short) noexcept {
         verdict.rejected = verdict.summary.flagged = true;
         verdict.summary.reason = "the two-step route takes two runs only: dwell rejected";
     } else {
-        if (settings.method == Method::two_step) {
-            verdict.summary.kappa = paper_.kappa();
-            verdict.summary.amplitude_g = paper_.amplitude_g();
-        }
+        if (settings.method == Method::two_step) take_paper_level(verdict.summary);
         DwellRow row;
         const bool known = !swept_ && row_of(verdict.summary, row);
         const bool kept = known && !verdict.rejected && rows.size() < rows.capacity();

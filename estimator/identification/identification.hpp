@@ -26,7 +26,7 @@ struct DwellSummary {
     LevelTensor gamma = kVertical;  ///< whole dwell
     [[nodiscard]] VibrationMoment vibration() const noexcept { return {kappa, gamma}; }
     double amplitude_g = 0;             ///< sqrt(2 (kappa - 1)), platform
-    double frequency_hz = 0;            ///< lock-in; 0 at rest and under random vibration
+    double frequency_hz = 0;            ///< lock-in; 0 at rest, under random vibration, not found
     double relative_error = 0;          ///< of kappa - 1, 1 sigma; of random vibration
     double mean_force_g = 0;            ///< W{fu}; 1 within 2 % or the dwell is rejected
     double nis_per_dof = 0;             ///< 0 where the filter saw nothing, as of a sweep

@@ -80,6 +80,7 @@ struct Identification::Impl {
     /// `hz`: of a sine.
     [[nodiscard]] Seen seen_of(const DwellInfo& dwell, double hz) const noexcept;
     void begin_paper_level() noexcept;
+    void take_paper_level(DwellSummary& summary) const noexcept;
     StepResult accept(const Reading& reading) noexcept;
     StepResult leave_alone(const Measurement& measurement) noexcept;
     StepResult replay() noexcept;

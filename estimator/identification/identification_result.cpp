@@ -105,6 +105,8 @@ std::string unobservable_warning(const std::array<bool, kParameters>& observable
 
 }  // namespace
 
+bool RunAmplitude::at_rest() const noexcept { return kappa - 1 < VibrationLevel::kAtRest; }
+
 std::vector<DwellRow> without_apart(const std::vector<DwellRow>& rows) {
     std::vector<DwellRow> out;
     out.reserve(rows.size());

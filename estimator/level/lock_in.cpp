@@ -105,8 +105,18 @@ class LineFit {
 
     void solve(Vibration& v) const noexcept { static_cast<void>(solve(normal_, right_, v)); }
 
-    /// With the last column, about `v`, which is refined; returns the change of w.
-    [[nodiscard]] double solve_for_frequency(Vibration& v) const noexcept {
+    /// Of the fundamental of `v` over the readings.
+    [[nodiscard]] double variance_of(const Vibration& v) const noexcept {
+        const double mean = v.cosine * normal_(1, 0) + v.sine * normal_(2, 0);
+        const double square = v.cosine * v.cosine * normal_(1, 1) +
+                              2.0 * v.cosine * v.sine * normal_(2, 1) +
+                              v.sine * v.sine * normal_(2, 2);
+        const double count = normal_(0, 0);
+        return count > 0 ? square / count - mean * mean / (count * count) : 0.0;
+    }
+
+    /// With the last column, about `v`; returns the change of w.
+    [[nodiscard]] double frequency_change(const Vibration& v) const noexcept {
         double one = 0, square = 0, value = 0;
         Eigen::Vector4d lines = Eigen::Vector4d::Zero();
         each_reading(window_, omega_, [&](double t, double c, double s, double reading) {
@@ -123,7 +133,8 @@ class LineFit {
         normal(5, 5) = square;
         Vector6 right = right_;
         right[5] = value;
-        return solve(normal, right, v);
+        Vibration about_it;
+        return solve(normal, right, about_it);
     }
 
   private:
@@ -186,7 +197,7 @@ Vibration lock_in(const Window& window, double nominal_hz) noexcept {
     fit.solve(v);
     const double span = static_cast<double>(window.count) * window.period_s;
     for (int pass = 0; pass < 2 && std::hypot(v.cosine, v.sine) > kLeastAmplitude; ++pass) {
-        const double change = fit.solve_for_frequency(v);
+        const double change = fit.frequency_change(v);
         if (!std::isfinite(change) || std::abs(change) > 2.0 / span) break;
         omega += change;
         fit = LineFit(window, omega);
@@ -194,6 +205,7 @@ Vibration lock_in(const Window& window, double nominal_hz) noexcept {
     }
     v.frequency_hz = omega / (2.0 * kPi);
     v.amplitude = std::hypot(v.cosine, v.sine);
+    v.variance = fit.variance_of(v);
     v.phase = std::atan2(v.cosine, v.sine);
     return v;
 }

@@ -12,6 +12,9 @@ struct Vibration {
     double phase = 0;      ///< rad, at the first sample
     double frequency_hz = 0;
     double cosine = 0, sine = 0, cosine2 = 0, sine2 = 0;  ///< g
+    /// Of the fundamental over the samples fitted, g^2: half of amplitude^2, but next to a multiple
+    /// of half the sample rate, where a column vanishes and a large amplitude says nothing.
+    double variance = 0;
     [[nodiscard]] double at(double time_s) const noexcept;
 };
 

@@ -9,8 +9,6 @@
 namespace vibrig::estimator {
 namespace {
 
-/// Below this kappa - 1 the table is at rest.
-constexpr double kAtRest = 1e-4;
 constexpr double kMostOfIt = 0.5;  ///< share of the mean square
 
 std::size_t samples_in(double seconds, double period_s) noexcept {
@@ -142,8 +140,7 @@ double VibrationLevel::frequency_hz() const noexcept {
     // The lock-in finds a line near the nominal frequency in whatever it is given: it has to be
     // most of what vibrates.
     const Vibration& line = fitted();
-    return line.amplitude * line.amplitude > kMostOfIt * 2.0 * (kappa_ - 1.0) ? line.frequency_hz
-                                                                              : 0.0;
+    return line.variance > kMostOfIt * (kappa_ - 1.0) ? line.frequency_hz : 0.0;
 }
 
 bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s,

@@ -18,6 +18,7 @@ class VibrationLevel {
     static constexpr double kFirstWindow_s = 2.0;
     static constexpr double kRefresh_s = 0.2;
     static constexpr double kHighestRate_hz = 2000.0;
+    static constexpr double kAtRest = 1e-4;  ///< below this kappa - 1 the table is at rest
 
     VibrationLevel(double window_s, double noise_g, double nominal_hz);
 

@@ -61,8 +61,8 @@ void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
 
 /// What became of many starts.
 struct ManyStarts {
-    std::vector<double> times;  ///< of those that settled, ascending, s
-    double bound = 0;           ///< s, after the start or the step
+    std::vector<double> times;  ///< of those that settled, from the start or the step, ascending, s
+    double bound = 0;           ///< of these times, s
     double worst_tilt = 0;      ///< when declared, rad
     std::size_t late = 0, never = 0, falsely = 0;
 
@@ -104,7 +104,8 @@ ManyStarts simulate_many(const Options& options, const levelling::LevellerSettin
             continue;
         }
         const bool stepped = start.step_s >= 0 && start.step_s < run.settled_s;
-        many.late += run.settled_s - (stepped ? start.step_s : 0) > many.bound ? 1 : 0;
+        const double took_s = run.settled_s - (stepped ? start.step_s : 0);
+        many.late += took_s > many.bound ? 1 : 0;
         double tilt = 0;
         for (std::size_t i = 0; i < 2; ++i) {
             tilt = std::max(tilt,
@@ -112,7 +113,7 @@ ManyStarts simulate_many(const Options& options, const levelling::LevellerSettin
         }
         many.falsely += tilt > 2 * tolerance ? 1U : 0U;
         many.worst_tilt = std::max(many.worst_tilt, tilt);
-        many.times.push_back(run.settled_s);
+        many.times.push_back(took_s);
     }
     std::sort(many.times.begin(), many.times.end());
     return many;
@@ -136,13 +137,11 @@ int run_many(const Options& options) {
                               {"tolerance_arcmin", tolerance / kRadPerArcmin}})
                   << '\n';
     } else {
-        std::cout << printed(
-                         "%zu of %zu settled, %zu later than %.5g s after the start or the step, "
-                         "%zu declared falsely\n",
-                         many.times.size(), options.runs, many.late, many.bound, many.falsely)
+        std::cout << printed("%zu of %zu settled, %zu later than %.5g s, %zu declared falsely\n",
+                             many.times.size(), options.runs, many.late, many.bound, many.falsely)
                   << printed(
-                         "time: median %.5g s, 95 %% within %.5g s, longest %.5g s; largest tilt "
-                         "when declared %.3g' (tolerance %.3g')\n",
+                         "time after the start or the step: median %.5g s, 95 %% within %.5g s, "
+                         "longest %.5g s\nlargest tilt when declared %.3g' (tolerance %.3g')\n",
                          many.time_within(0.5), many.time_within(0.95), many.time_within(1),
                          many.worst_tilt / kRadPerArcmin, tolerance / kRadPerArcmin);
     }

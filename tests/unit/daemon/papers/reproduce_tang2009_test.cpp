@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
 
 #include "tests/unit/support/vibrig_command.hpp"
 
@@ -89,6 +90,32 @@ TEST_F(Reproduce, LinesAreAtMost120ColumnsAndEveryRowHasValues) {
         const Json result = Json::parse(out)["reproductions"][0];
         for (const Json& row : result["rows"]) expect_whole(row);
     }
+}
+
+// What four seeds make of their own scatter is no measure of it: a band that says 99.9 or 99.7 %
+// has to know how many they are.
+TEST_F(Reproduce, BandsWithAProbabilityHoldAtFewSeedsToo) {
+    ASSERT_LE(vibrig("reproduce tang2009 --json --seeds 4"), 1) << error;
+    reproduction = Json::parse(out)["reproductions"][0];
+    int with_probability = 0;
+    for (const Json& row : reproduction["rows"]) {
+        if (row["theory"].get<std::string>().find("(99.") == std::string::npos) continue;
+        ++with_probability;
+        EXPECT_EQ(row["agrees"], true) << row;
+    }
+    EXPECT_EQ(with_probability, 25);
+    // Twelve errors, which hardly correlate: 0.05 and 99.95 % of their chi-square.
+    const Json bias =
+        row_of("12 g: trial 2, joint, bias, rms relative error, %, against theory")["values"];
+    const double theory = bias["theory"];
+    EXPECT_NEAR(bias["at_least"].get<double>() / theory, std::sqrt(1.9344 / 12), 0.02);
+    EXPECT_NEAR(bias["at_most"].get<double>() / theory, std::sqrt(34.821 / 12), 0.02);
+    // The paper's one draw against their mean: Student's 8.891 of 3 degrees of freedom.
+    const Json row = row_of(
+        "12 g: trial 1, two-step, bias, rms relative error, %, against the paper's one draw");
+    const double sigma = row["values"]["sigma"];
+    EXPECT_NEAR(std::stod(row["theory"].get<std::string>().substr(7)),
+                8.891 * sigma * std::sqrt(1.25), 0.01 * 8.891 * sigma);
 }
 
 // The rigs' seeds are 1, 2, ... in every run, so the numbers are the same in every run. How many

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
@@ -197,6 +199,74 @@ TEST(Identification, AFrequencyAtHalfTheSampleRateIsRefused) {
     EXPECT_EQ(rig.dwell(identification, plan).used, 0U);
     plan.amplitude_g = 0;
     EXPECT_EQ(rig.dwell(identification, plan).used, 400U) << "at rest there is nothing to alias";
+}
+
+TEST(Identification, AVibrationMeasuredAtHalfTheSampleRateIsRefusedWhateverTheKeySays) {
+    // GIVEN a key that is half a hertz off a vibration at half the sample rate
+    Settings settings;
+    settings.frequency_hz = 19.5;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        Identification identification(settings);
+        RigSimulator rig(seed);
+        SimulatedDwell plan;
+        plan.frequency_hz = 20;
+        plan.duration_s = 10;
+        const DwellSummary summary = rig.dwell(identification, plan);
+        EXPECT_TRUE(summary.left_out)
+            << "seed " << seed << ", kappa " << summary.kappa << ' ' << summary.reason;
+        EXPECT_STREQ(summary.reason,
+                     "the vibration is too close to a multiple of half the sample rate: dwell "
+                     "rejected")
+            << "seed " << seed;
+    }
+}
+
+TEST(Identification, AVibrationThatIsNotAtItsFrequencyIsReported) {
+    // GIVEN a vibration of 6 g that is 3 Hz off what the key says, and one at it
+    const auto reason = [](double hz, double amplitude_g) -> std::string {
+        Identification identification{Settings{}};
+        RigSimulator rig(43);
+        SimulatedDwell plan;
+        plan.frequency_hz = hz;
+        plan.amplitude_g = amplitude_g;
+        plan.duration_s = 10;
+        const DwellSummary summary = rig.dwell(identification, plan);
+        EXPECT_FALSE(summary.left_out) << "the level needs no frequency: " << summary.reason;
+        return summary.reason;
+    };
+    // THEN it is used, and said to be judged by nothing
+    EXPECT_EQ(reason(18.2, 6),
+              "the vibration is not found near vibration.frequency_hz: aliasing cannot be judged");
+    EXPECT_EQ(reason(15, 6), "");
+    EXPECT_EQ(reason(18.2, 0), "");
+    // AND what does no harm to the level is not: 0.02 g, kappa 1.0002
+    EXPECT_EQ(reason(18.2, 0.02), "");
+}
+
+/// Over 14 positions and two levels, dwells of `duration_s`: how many say that Eq. 13 is off.
+long off_by_eq_13(std::uint64_t seed, double frequency_hz, double duration_s) {
+    Settings settings;
+    settings.method = Method::two_step;
+    Identification identification(settings);
+    RigSimulator rig(seed);
+    SimulatedDwell plan;
+    plan.frequency_hz = frequency_hz;
+    plan.duration_s = duration_s;
+    rig.campaign(identification, {6, 14.0 / 3}, plan);
+    const Result result = identification.result();
+    return std::ranges::count_if(result.dwells, [](const DwellSummary& d) {
+        return d.flagged && std::string(d.reason).find("eq. 13") != std::string::npos;
+    });
+}
+
+TEST(Identification, TheTwoStepRouteSaysWhereEq13IsOffTheMeasuredLevel) {
+    // GIVEN a table 3 mHz off, of which Eq. 13 sees sin(0.3 pi)/(0.3 pi) = 0.858 over 100 s
+    // THEN every dwell says so
+    EXPECT_EQ(off_by_eq_13(1, 15.003, 100), 28) << "seed 1";
+    // AND at the nominal frequency none: 5 sigma of noise, 5 sigma_a a0 sqrt(2 / (n kappa)) = 3e-5,
+    // are far below the limit of 1e-2
+    for (std::uint64_t seed = 1; seed <= 20; ++seed)
+        EXPECT_EQ(off_by_eq_13(seed, 15, 20), 0) << "seed " << seed;
 }
 
 TEST(Identification, RefusesSettingsThatCannotWorkByName) {

@@ -127,6 +127,30 @@ TEST(VibrationLevel, ClaimsNoFrequencyThatIsNotThere) {
     }
 }
 
+TEST(VibrationLevel, AboutHalfTheSampleRateALineIsWhatItMakesOfTheSamples) {
+    // GIVEN a level told 19.5 Hz at 40 Hz, where the sine's column vanishes at 20 Hz
+    const std::uint64_t seed = 31;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> phase(0.2, kPi - 0.2);
+    for (int trial = 0; trial < 200; ++trial) {
+        for (const double hz : {13.334, 14.2, 16.1, 20.0}) {
+            Signal signal;
+            signal.frequency = hz;
+            signal.phase = phase(random);
+            signal.phase2 = phase(random);
+            VibrationLevel level(10, signal.noise, 19.5);
+            stream(level, signal, 400, random);
+            // THEN no line is made up from a large amplitude that the samples do not have, and one
+            // that is at half the sample rate is found
+            if (hz == 20)
+                EXPECT_NEAR(level.frequency_hz(), 20, 0.05) << "phase " << signal.phase;
+            else
+                EXPECT_EQ(level.frequency_hz(), 0) << "phase " << signal.phase << ", " << hz;
+        }
+    }
+}
+
 TEST(VibrationLevel, GravityCalibratesTheGain) {
     std::mt19937_64 random(21);
     Signal signal;

@@ -82,6 +82,20 @@ TEST_F(LevelCommand, ADesignPromisesWhatSimulatedStartsKeep) {
     }
 }
 
+TEST_F(LevelCommand, TimesOfManyStartsAreCountedAsTheirBoundIs) {
+    // GIVEN the starts of docs/theory/zha2019.md with a step at a random time, up to 200 s
+    const std::string given =
+        "level simulate --tilt 30,30 --step 2 --window 10 --tolerance 0.2 --runs 400";
+    const Json starts = json(given, 0);
+    // THEN none is late, and no time is beyond the bound: both run from the start or the step
+    EXPECT_EQ(starts["late"], 0);
+    EXPECT_LE(starts["longest_s"], starts["bound_s"]);
+    // AND 95 % are declared within settling time, window, hold (1/sigma = 19.05 s) and 5 %
+    EXPECT_LE(starts["p95_s"], 1.05 * 129.05);
+    EXPECT_EQ(vibrig(given), 0);
+    EXPECT_NE(out.find("time after the start or the step: median"), std::string::npos) << out;
+}
+
 TEST_F(LevelCommand, RefusesBadInput) {
     expect_refusal("level design --damping 1.5", "damping ratio xi: 1.5, expected between 0 and 1");
     expect_refusal("level design --settling 60 --period 1",
