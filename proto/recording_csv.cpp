@@ -1,9 +1,11 @@
 #include "proto/recording_csv.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -107,6 +109,41 @@ class RecordingReader::Rows {
     [[nodiscard]] std::uint64_t bytes() const { return lines_.bytes(); }
 
   private:
+    /// Tells a dwell that is there twice: times may begin anew in each dwell, but noise does not
+    /// come again. Told by the first rows, so that a copy that was cut short is found, too.
+    class CopiesSeen {
+      public:
+        void begin(std::size_t line) {
+            line_ = line;
+            rows_ = 0;
+            hash_ = kFnvOffset;
+        }
+        /// The line where the same samples began before; 0: they are new, or too few to tell yet.
+        [[nodiscard]] std::size_t add(const RecordingRow& row) {
+            if (rows_ == kTold) return 0;
+            mix(row.time_s);
+            for (const double angle : row.angle_deg) mix(angle);
+            for (const double force : row.force_g) mix(force);
+            if (++rows_ < kTold) return 0;
+            const auto [known, fresh] = begun_.emplace(hash_, line_);
+            return fresh ? 0 : known->second;
+        }
+        [[nodiscard]] std::size_t line() const { return line_; }  ///< where the dwell began
+
+      private:
+        static constexpr std::size_t kTold = 40;  ///< 1 s of the usual 40 samples/s
+        static constexpr std::uint64_t kFnvOffset = 0xcbf29ce484222325U, kFnvPrime = 0x100000001b3U;
+
+        void mix(double value) {
+            hash_ = (hash_ ^ std::bit_cast<std::uint64_t>(value)) * kFnvPrime;
+            hash_ ^= hash_ >> 32U;
+        }
+
+        std::size_t line_ = 0, rows_ = 0;
+        std::uint64_t hash_ = kFnvOffset;
+        std::unordered_map<std::uint64_t, std::size_t> begun_;  ///< lines by their first rows
+    };
+
     [[noreturn]] void fail(std::string_view column, const std::string& what) const {
         throw RecordingError(path_, lines_.line(), std::string(column), what);
     }
@@ -328,8 +365,21 @@ class RecordingReader::Rows {
                      ", the time before it in run " + std::to_string(row.run) + ", position " +
                      std::to_string(row.position));
         }
+        if (!last_time_ || pair != dwell_) copies_.begin(row.line);
         last_time_ = row.time_s;
         dwell_ = pair;
+        refuse_copy(row);
+    }
+
+    /// Taken as a measurement of its own, a copy would halve the variance of what it knows.
+    void refuse_copy(const RecordingRow& row) {
+        const std::size_t before = copies_.add(row);
+        if (before == 0) return;
+        throw RecordingError(path_, copies_.line(), "",
+                             "found run " + std::to_string(row.run) + ", position " +
+                                 std::to_string(row.position) +
+                                 " with the times and samples of the dwell of line " +
+                                 std::to_string(before) + ", expected each dwell once");
     }
 
     std::string path_;
@@ -342,6 +392,7 @@ class RecordingReader::Rows {
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
     std::pair<int, int> dwell_;
     std::optional<double> last_time_;  ///< of the dwell in force
+    CopiesSeen copies_;
 };
 
 RecordingError::RecordingError(const std::string& file, std::size_t line, const std::string& column,

@@ -48,7 +48,8 @@ class RecordingError : public std::runtime_error {
 /// nothing: the dwell was at rest or under a sine. Fields are separated by commas, or by semicolons
 /// or tabs as the header says; then numbers may have decimal commas. Lines of comment (#) may come
 /// before the header. A (run, position) pair that comes back after another one begins a new dwell.
-/// Throws RecordingError.
+/// One that begins with the times and samples of another is a copy of it, and refused. Throws
+/// RecordingError.
 class RecordingReader {
   public:
     /// Reads the header.

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 
+#include "proto/durable_file.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::proto {
@@ -73,7 +74,8 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
     const auto fail = [&](const char* what) {
         throw RecordingError(path, 0, "", std::string(what) + std::strerror(errno));
     };
-    std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wb"));
+    OutputFile out(path);
+    std::unique_ptr<std::FILE, Close> file(std::fopen(out.place().c_str(), "wb"));
     if (!file) fail("cannot be opened for writing: ");
     const Extras extras(rows, simulated, profiles);
     std::string text =
@@ -97,6 +99,7 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
     flush();
     // A full disk shows itself only when the buffer is written out.
     if (std::fclose(file.release()) != 0) fail("cannot be written: ");
+    out.finish();
 }
 
 }  // namespace vibrig::proto

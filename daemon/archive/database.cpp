@@ -46,6 +46,7 @@ Database::Database(const std::string& where, Mode mode)
                             "was written by a newer vibrig",
                             found, newest_version()));
         if (found == newest_version()) return;
+        if (found == 0 && !server_) refuse_foreign();
         if (mode == Mode::read)
             throw ArchiveError(
                 fmt::format("found an index of version {}, expected {}: whoever may "
@@ -92,6 +93,18 @@ int Database::version() {
     soci::indicator known = soci::i_null;
     *session_ << "SELECT max(number) FROM index_version", soci::into(number, known);
     return known == soci::i_ok ? number : 0;
+}
+
+void Database::refuse_foreign() {
+    int tables = 0, ours = 0;
+    *session_ << "SELECT count(*), count(CASE WHEN name IN ('file', 'index_version') THEN 1 END) "
+                 "FROM sqlite_master "
+                 "WHERE type = 'table'",
+        soci::into(tables), soci::into(ours);
+    if (tables > 0 && ours == 0)
+        throw ArchiveError(
+            "found a database that is no index, expected one of recordings: it is somebody else's "
+            "and was not changed");
 }
 
 void Database::migrate() {

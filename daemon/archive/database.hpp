@@ -40,6 +40,8 @@ class Database {
     [[noreturn]] void rethrow() const;
     void connect(const std::string& where, Mode mode);
     void migrate();
+    /// A file that has tables and not an index's.
+    void refuse_foreign();
 
     std::string name_;
     bool server_;

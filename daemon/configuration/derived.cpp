@@ -60,7 +60,8 @@ void take_plan(Configuration& c) {
     const auto transmission = [&c](std::optional<double> hz) {
         return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
     };
-    for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
+    for (const auto& run :
+         plan::read_plan(c.campaign.plan, transmission, c.estimator.frequency_hz)) {
         if (!run.profile.empty()) {
             c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run));
             continue;

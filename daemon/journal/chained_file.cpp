@@ -49,6 +49,7 @@ Database& ChainedFile::database() {
 }
 
 std::vector<std::string> ChainedFile::open() {
+    refuse_foreign(path_, {"event", "chain"});
     std::vector<std::string> found;
     const FoundHead beside = read_head(path_ + kHeadSuffix);
     if (!beside.wrong.empty()) found.push_back(beside.wrong);

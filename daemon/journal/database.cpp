@@ -71,6 +71,27 @@ Database::Database(const std::string& path, Mode mode) : path_(path) {
 
 Database::~Database() = default;
 
+void refuse_foreign(const std::string& path, const std::vector<std::string>& tables) {
+    std::error_code none;
+    if (!std::filesystem::exists(path, none)) return;
+    std::vector<Row> names;
+    try {
+        names = Database(path, Database::Mode::read)
+                    .ask("SELECT name FROM sqlite_master WHERE type = 'table'");
+    } catch (const DatabaseError&) {
+        return;
+    }
+    const auto is_ours = [&](const Row& row) {
+        return std::ranges::find(tables, row.texts.at(0)) != tables.end();
+    };
+    if (!names.empty() && std::ranges::none_of(names, is_ours))
+        throw DatabaseError(
+            fmt::format("{}: found a database without a table {} (its first is {}), expected "
+                        "another file: this one is somebody else's and was not changed",
+                        path, fmt::join(tables, " or "), names.front().texts.at(0)),
+            0);
+}
+
 void Database::fail(const char* doing) const {
     const int code = database_ ? sqlite3_extended_errcode(database_.get()) : SQLITE_NOMEM;
     // Whatever was to be done with it: who has to look at the file is helped by its state.

@@ -72,6 +72,10 @@ class Database {
     std::unique_ptr<sqlite3, Close> database_;
 };
 
+/// Before a file is opened for writing, which changes it: refuses a database that has tables and
+/// none of these, as somebody else's. One that is damaged is for who opens it.
+void refuse_foreign(const std::string& path, const std::vector<std::string>& tables);
+
 /// A picture of the file that no writer changes, as long as it lives.
 class Snapshot {
   public:

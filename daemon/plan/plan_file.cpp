@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "daemon/plan/number_table.hpp"
+#include "proto/edits.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::plan {
@@ -16,11 +18,31 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kMostRuns = 100'000;
 constexpr double kMostG = 1000, kMostHz = 20'000;
-constexpr double kMostInner = 80;  // beyond it the gimbals lock
+constexpr double kMostInner = 80;                                   // beyond it the gimbals lock
+constexpr const char* kCounts = "a whole number from 1 to 100000";  // kMostRuns
 constexpr double kAgreement = 0.01;
 constexpr double kAtRestG = 1e-9;
 
 std::string number(double value) { return Json(value).dump(); }
+
+/// A misspelt key would leave the rig to its configuration without a word.
+void refuse_unknown(const Json& object, std::initializer_list<std::string_view> known,
+                    const std::string& place) {
+    constexpr std::size_t kLongest = 100, kMostEdits = 3;
+    for (const auto& [key, value] : object.items()) {
+        if (std::ranges::find(known, key) != known.end()) continue;
+        std::string_view near;
+        std::size_t fewest = kMostEdits + 1;
+        for (const std::string_view name : known) {
+            const std::size_t edits = key.size() > kLongest ? fewest : proto::edits(key, name);
+            if (edits >= fewest) continue;
+            fewest = edits;
+            near = name;
+        }
+        refuse(place + "." + proto::printable(key), "an unknown key",
+               near.empty() ? "a known one" : "a known one, perhaps " + std::string(near));
+    }
+}
 
 void check_position(const std::array<double, 3>& position, const std::string& place) {
     for (const double angle : position) {
@@ -103,6 +125,7 @@ bool take_sweep(PlannedRun& run, const Json& json, const std::string& place) {
     const std::string at = place + ".sweep";
     if (!found->is_object())
         refuse(at, found->dump().substr(0, 60), "an object with from_hz, to_hz and s");
+    refuse_unknown(*found, {"from_hz", "to_hz", "s"}, at);
     std::array<double, 3> values{};
     for (std::size_t k = 0; k < 3; ++k) {
         const char* key = std::array{"from_hz", "to_hz", "s"}[k];
@@ -147,6 +170,10 @@ bool held_out(const Json& json, const std::string& place) {
 PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
                      const std::string& place) {
     if (!json.is_object()) refuse(place, json.dump().substr(0, 60), "an object");
+    refuse_unknown(json,
+                   {"position", "level_g", "table_g", "count", "frequency_hz", "sweep", "profile",
+                    "level_db", "role"},
+                   place);
     PlannedRun run;
     const auto position = json.find("position");
     if (position == json.end() || !position->is_array() || position->size() != 3 ||
@@ -168,15 +195,74 @@ PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
     }
     if (const auto count = number_at(json, "count", place)) {
         if (!(*count >= 1 && *count <= kMostRuns && *count == std::floor(*count))) {
-            refuse(place + ".count", number(*count), "a whole number from 1");
+            refuse(place + ".count", number(*count), kCounts);
         }
         run.count = static_cast<std::size_t>(*count);
     }
     return run;
 }
 
+/// What stands beside the runs: what vibrig plan writes.
+void check_keys(const Json& plan, const std::string& path) {
+    refuse_unknown(plan,
+                   {"d_efficiency",
+                    "bound",
+                    "rank",
+                    "runs",
+                    "standard_errors",
+                    "duration_s",
+                    "slewing_s",
+                    "vibrating_s",
+                    "dwell_s",
+                    "transmission",
+                    "frequency_hz",
+                    "coefficients",
+                    "run_count",
+                    "a_efficiency",
+                    "e_efficiency_at_least",
+                    "condition",
+                    "unit_standard_errors",
+                    "strongest_correlation",
+                    "drift_imbalance",
+                    "optimal_shares",
+                    "optimum_gap",
+                    "warnings",
+                    "survey",
+                    "sweeps",
+                    "order_inflation",
+                    "combined_uncertainty",
+                    "expanded_uncertainty",
+                    "refusal",
+                    "undetermined",
+                    "vertical_axes"},
+                   path + ": plan");
+}
+
+/// The plan's rig against this one, in what its runs take from it.
+void check_rig(const Json& plan, const std::vector<PlannedRun>& runs,
+               const TransmissionAt& transmission, std::optional<double> rig_hz,
+               const std::string& path) {
+    const auto apart = [](double a, double b) { return !(std::abs(a - b) <= kAgreement * b); };
+    const std::string place = path + ": plan";
+    if (const auto dwell_s = number_at(plan, "dwell_s", place); dwell_s && !(*dwell_s > 0))
+        refuse(place + ".dwell_s", number(*dwell_s), "more than 0 s");
+    const auto stated = number_at(plan, "transmission", place);
+    const auto own = transmission(std::nullopt);
+    if (stated && own && apart(*stated, *own))
+        refuse(place + ".transmission", number(*stated), "the configuration's, " + number(*own));
+    const auto hz = number_at(plan, "frequency_hz", place);
+    const bool taken = std::ranges::any_of(runs, [](const PlannedRun& run) {
+        return run.profile.empty() && run.sweep_to_hz == 0 && run.frequency_hz == 0 &&
+               run.table_g > 0;
+    });
+    if (hz && rig_hz && taken && apart(*hz, *rig_hz))
+        refuse(place + ".frequency_hz", number(*hz) + " Hz, and runs without one of their own",
+               "the configuration's vibration.frequency_hz, " + number(*rig_hz) + " Hz");
+}
+
 std::vector<PlannedRun> runs_from_json(const std::string& text, const std::string& path,
-                                       const TransmissionAt& transmission) {
+                                       const TransmissionAt& transmission,
+                                       std::optional<double> rig_hz) {
     Json json;
     try {
         json = Json::parse(text);
@@ -189,11 +275,13 @@ std::vector<PlannedRun> runs_from_json(const std::string& text, const std::strin
     }
     const auto runs = json.find("runs");
     if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");
+    check_keys(json, path);
     std::vector<PlannedRun> result;
     for (const Json& run : *runs) {
         result.push_back(
             from_json(run, transmission, path + ": runs[" + std::to_string(result.size()) + "]"));
     }
+    check_rig(json, result, transmission, rig_hz, path);
     return result;
 }
 
@@ -291,7 +379,7 @@ PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_de
     }
     if (const auto count = row.maybe("count")) {
         if (!(*count >= 1 && *count <= kMostRuns && *count == std::floor(*count)))
-            refuse(row.place("count"), number(*count), "a whole number from 1");
+            refuse(row.place("count"), number(*count), kCounts);
         run.count = static_cast<std::size_t>(*count);
     }
     return run;
@@ -333,11 +421,12 @@ std::vector<PlannedRun> read_plan(const std::string& path, double transmission) 
     return runs;
 }
 
-std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission) {
+std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission,
+                                  std::optional<double> rig_hz) {
     const std::string text = content_of(path);
     const std::size_t first = text.find_first_not_of(" \t\r\n");
     auto runs = first != std::string::npos && text[first] == '{'
-                    ? runs_from_json(text, path, transmission)
+                    ? runs_from_json(text, path, transmission, rig_hz)
                     : runs_from_csv(text, path, transmission);
     std::size_t sum = 0;
     for (const PlannedRun& run : runs) sum += run.count;
@@ -348,8 +437,12 @@ std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt&
 }
 
 std::vector<std::array<double, 3>> read_positions(const std::string& path) {
-    return positions_of(
-        read_table(content_of(path), path, {{"alpha_deg", "beta_deg", "gamma_deg"}}), path);
+    const NumberTable table =
+        read_table(content_of(path), path, {{"alpha_deg", "beta_deg", "gamma_deg"}});
+    // It has these angles, too, in each of thousands of samples.
+    if (table.find("time_s") && table.find("run"))
+        refuse(path, "a recording (columns time_s and run)", "a position in each row");
+    return positions_of(table, path);
 }
 
 }  // namespace vibrig::plan

@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <system_error>
 
 #include "daemon/plot/xml_text.hpp"
+#include "proto/durable_file.hpp"
 
 namespace vibrig::tool::plot {
 
@@ -312,13 +311,7 @@ std::string Chart::svg() const {
 }
 
 void write_file(const std::string& path, const std::string& text) {
-    errno = 0;
-    std::ofstream file(path, std::ios::binary);
-    file << text << std::flush;
-    if (!file) {
-        throw std::runtime_error(path +
-                                 ": cannot be written: " + std::generic_category().message(errno));
-    }
+    proto::write_output(path, text);
 }
 
 void make_folder(const std::string& path) {

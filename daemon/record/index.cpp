@@ -118,6 +118,7 @@ std::vector<journal::Row> Index::ask(const char* sql, const std::vector<std::str
 Index::~Index() = default;
 
 void Index::open() {
+    journal::refuse_foreign(path_in(folder_), {"file", "index_version"});
     database_ = std::make_unique<Database>(path_in(folder_));
     // It can be made anew: no waiting for the disk.
     database_->execute("PRAGMA synchronous = OFF");
@@ -359,6 +360,11 @@ std::vector<std::string> missing_raw(const std::string& campaign_folder, const I
     for (const auto& path : there) expected.erase(raw_number(path));
     std::vector<std::string> words;
     for (auto& [number, text] : expected) words.push_back(std::move(text));
+    // A compressed one has its name once it is whole, also while the campaign is being written.
+    for (const auto& path : there) {
+        if (path.ends_with(".zst") && is_cut(path))
+            words.push_back(fmt::format("the end of {}: the file is cut off", base_name(path)));
+    }
     return words;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <spdlog/fmt/fmt.h>
+#include <sys/mman.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -222,6 +223,25 @@ std::string compress(const std::string& path, const std::function<void()>& on_pr
     if (std::rename(part.c_str(), to.c_str()) != 0) return failed(std::strerror(errno));
     ::unlink(path.c_str());
     return {};
+}
+
+bool is_cut(const std::string& path) {
+    std::error_code error;
+    const std::size_t size = std::filesystem::file_size(path, error);
+    if (error || size == 0) return !error;
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    void* const bytes = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+    if (file >= 0) ::close(file);
+    if (bytes == MAP_FAILED) return false;  // whoever reads it says why not
+    std::size_t at = 0;
+    while (at < size) {
+        const std::size_t frame =
+            ZSTD_findFrameCompressedSize(static_cast<const char*>(bytes) + at, size - at);
+        if (ZSTD_isError(frame) != 0) break;
+        at += frame;
+    }
+    ::munmap(bytes, size);
+    return at != size;
 }
 
 struct RawReader::Input {

@@ -78,6 +78,9 @@ class RawLog {
 [[nodiscard]] std::string compress(const std::string& path,
                                    const std::function<void()>& on_progress = {});
 
+/// True: a compressed file is empty or ends within a frame of zstd. Only the sizes in it are read.
+[[nodiscard]] bool is_cut(const std::string& path);
+
 /// A file of a raw log piece by piece, decompressed if it ends in .zst. Throws std::runtime_error.
 class RawReader {
   public:

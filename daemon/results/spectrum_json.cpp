@@ -1,13 +1,16 @@
 #include "daemon/results/spectrum_json.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/results/spectrum_text.hpp"
+#include "daemon/results/text_line.hpp"
 #include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
@@ -170,55 +173,189 @@ Json held_out_json(const SpectrumResult& of) {
     return list;
 }
 
-const nlohmann::json& member(const nlohmann::json& in, const char* key, const std::string& place) {
+using ReadJson = nlohmann::json;
+
+constexpr double kMost = 1e12;  ///< of a coefficient, deg/h/g^2; beyond it sums are no numbers
+constexpr double kMostHz = 1e5;
+constexpr double kMostElevation = 2;  ///< as of the configuration's site.elevation_deg
+constexpr double kRounding = 1e-6;    ///< of correlations and weights, by their computation
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found,
+                         const std::string& expected) {
+    throw std::runtime_error(place + ": found " + found + ", expected " + expected);
+}
+
+std::string shown(const ReadJson& value) { return value.dump().substr(0, 60); }
+
+const ReadJson& member(const ReadJson& in, const char* key, const std::string& place) {
     const auto found = in.find(key);
-    if (found == in.end())
-        throw std::runtime_error(place + key +
-                                 ": found nothing, expected the result of vibrig identify --json");
+    if (found == in.end()) refuse(place + key, "nothing", "the result of vibrig identify --json");
     return *found;
 }
 
-estimator::SignedAxis read_axis(const std::string& text) {
-    const auto at = text.size() == 2 ? std::string("xyz").find(text[1]) : std::string::npos;
-    if (at == std::string::npos)
-        throw std::runtime_error("found '" + text + "', expected an axis such as +y");
-    return {static_cast<int>(at), text[0] == '-' ? -1 : 1};
+double read_number(const ReadJson& value, const std::string& place, double least, double most) {
+    if (!value.is_number() || !(value.get<double>() >= least && value.get<double>() <= most))
+        refuse(place, shown(value), printed("a number from %g to %g", least, most));
+    return value.get<double>();
 }
 
-VectorXd read_vector(const nlohmann::json& list) {
-    const auto values = list.get<std::vector<double>>();
-    return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+const ReadJson& list_of(const ReadJson& value, std::size_t size, const std::string& place) {
+    if (!value.is_array()) refuse(place, shown(value), "a list of " + std::to_string(size));
+    if (value.size() != size)
+        refuse(place, std::to_string(value.size()) + " entries", std::to_string(size));
+    return value;
 }
 
-MatrixXd read_rows(const nlohmann::json& list) {
-    MatrixXd out(static_cast<Index>(list.size()), static_cast<Index>(list.at(0).size()));
-    for (std::size_t i = 0; i < list.size(); ++i)
-        out.row(static_cast<Index>(i)) = read_vector(list[i]);
+std::string at(const std::string& place, std::size_t index) {
+    return place + "[" + std::to_string(index) + "]";
+}
+
+VectorXd read_vector(const ReadJson& list, Index size, double most, const std::string& place) {
+    VectorXd out(size);
+    const auto count = static_cast<std::size_t>(size);
+    list_of(list, count, place);
+    for (std::size_t i = 0; i < count; ++i)
+        out[static_cast<Index>(i)] = read_number(list[i], at(place, i), -most, most);
     return out;
 }
 
-void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
-    settings.up = read_axis(frame.at("up").get<std::string>());
-    for (std::size_t j = 0; j < 3; ++j) {
-        for (std::size_t k = 0; k < 3; ++k)
-            settings.gyro_axes[j][k] =
-                read_axis(frame.at("gyro_axes").at(j).at(k).get<std::string>());
+/// Symmetric and positive semidefinite, as far as their computation rounds.
+void check_covariance(const MatrixXd& p, const std::string& place) {
+    MatrixXd correlation = p;
+    for (Index i = 0; i < p.rows(); ++i) {
+        const std::string row = at(place, static_cast<std::size_t>(i));
+        if (!(p(i, i) >= 0))
+            refuse(at(row, static_cast<std::size_t>(i)), printed("%g", p(i, i)),
+                   "a variance of 0 or above");
+        for (Index j = 0; j < i; ++j) {
+            const double scale = std::sqrt(p(i, i) * p(j, j));
+            if (!(std::abs(p(i, j)) <= (1 + kRounding) * scale &&
+                  std::abs(p(i, j) - p(j, i)) <= kRounding * scale))
+                refuse(at(row, static_cast<std::size_t>(j)),
+                       printed("%g, and %g across", p(i, j), p(j, i)),
+                       printed("a symmetric covariance of at most %g", scale));
+            correlation(i, j) = correlation(j, i) = scale > 0 ? p(i, j) / scale : 0;
+        }
+        correlation(i, i) = p(i, i) > 0 ? 1 : 0;
     }
-    settings.elevation_deg = frame.at("elevation_deg").get<double>();
+    const double least =
+        Eigen::SelfAdjointEigenSolver<MatrixXd>(correlation, Eigen::EigenvaluesOnly)
+            .eigenvalues()
+            .minCoeff();
+    if (!(least >= -kRounding))
+        refuse(place, printed("correlations with an eigenvalue of %g", least),
+               "a positive semidefinite covariance");
+}
+
+/// Of the coefficients, and where it is linearised, of each resonance's frequency and damping too.
+MatrixXd read_covariance(const ReadJson& list, Index columns, Index resonances) {
+    const std::string place = "p";
+    const Index linearised = columns + 2 * resonances;
+    const bool longer = list.is_array() && list.size() == static_cast<std::size_t>(linearised);
+    const Index size = longer ? linearised : columns;
+    list_of(list, static_cast<std::size_t>(size), place);
+    MatrixXd out(size, size);
+    for (Index i = 0; i < size; ++i) {
+        const auto row = static_cast<std::size_t>(i);
+        out.row(i) = read_vector(list[row], size, kMost * kMost, at(place, row));
+    }
+    check_covariance(out, place);
+    return out;
+}
+
+/// None, itself or a list, as one_or_list() writes it.
+std::vector<estimator::spectrum::Resonance> read_resonances(const ReadJson& from) {
+    const auto listed = [&](const char* key) {
+        const ReadJson& value = member(from, key, "");
+        if (value.is_null()) return std::vector<double>{};
+        if (!value.is_array()) return std::vector<double>{read_number(value, key, 1e-9, kMostHz)};
+        std::vector<double> out;
+        for (const ReadJson& one : value)
+            out.push_back(read_number(one, at(key, out.size()), 1e-9, kMostHz));
+        return out;
+    };
+    const auto hz = listed("hz"), damping = listed("damping");
+    if (hz.size() != damping.size())
+        refuse("damping", std::to_string(damping.size()) + " values",
+               "as many as of hz, " + std::to_string(hz.size()));
+    std::vector<estimator::spectrum::Resonance> out;
+    for (std::size_t r = 0; r < hz.size(); ++r) out.push_back({hz[r], damping[r]});
+    return out;
+}
+
+estimator::SignedAxis read_axis(const ReadJson& value, const std::string& place) {
+    const std::string text = value.is_string() ? value.get<std::string>() : "";
+    const auto axis = text.size() == 2 ? std::string("xyz").find(text[1]) : std::string::npos;
+    if (axis == std::string::npos || (text[0] != '+' && text[0] != '-'))
+        refuse(place, shown(value), "an axis such as \"+y\"");
+    return {static_cast<int>(axis), text[0] == '-' ? -1 : 1};
+}
+
+void read_frame(const ReadJson& frame, const std::string& place, estimator::Settings& settings) {
+    settings.up = read_axis(member(frame, "up", place), place + "up");
+    const std::string of_gyros = place + "gyro_axes";
+    const ReadJson& gyros = list_of(member(frame, "gyro_axes", place), 3, of_gyros);
+    for (std::size_t j = 0; j < 3; ++j) {
+        std::array<bool, 3> seen{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto axis =
+                read_axis(list_of(gyros[j], 3, at(of_gyros, j))[k], at(at(of_gyros, j), k));
+            if (std::exchange(seen.at(static_cast<std::size_t>(axis.axis)), true))
+                refuse(at(of_gyros, j), shown(gyros[j]), "x, y and z once each");
+            settings.gyro_axes[j][k] = axis;
+        }
+    }
+    settings.elevation_deg = read_number(member(frame, "elevation_deg", place),
+                                         place + "elevation_deg", -kMostElevation, kMostElevation);
+}
+
+std::vector<Hypothesis> read_mixture(const ReadJson& list, const std::string& place) {
+    if (!list.is_array() || list.empty()) refuse(place, shown(list), "a list of hypotheses");
+    std::vector<Hypothesis> out;
+    double sum = 0;
+    for (const ReadJson& one : list) {
+        try {
+            out.push_back(read_hypothesis(one));
+        } catch (const std::runtime_error& error) {
+            throw std::runtime_error(at(place, out.size()) + "." + error.what());
+        }
+        sum += out.back().weight;
+    }
+    if (!(std::abs(sum - 1) <= kRounding)) refuse(place, printed("weights w of sum %g", sum), "1");
+    return out;
+}
+
+void read_effects(const ReadJson& effects, const std::string& place, Model& model) {
+    if (!effects.is_array()) refuse(place, shown(effects), "a list");
+    for (const ReadJson& one : effects) {
+        const std::string here = at(place, model.effects.size()) + ".";
+        const ReadJson& input = member(one, "input", here);
+        if (!input.is_string()) refuse(here + "input", shown(input), "a text");
+        Effect effect{input.get<std::string>(), "", {}};
+        const ReadJson& change = list_of(member(one, "change", here), 3, here + "change");
+        for (std::size_t j = 0; j < 3; ++j)
+            effect.change[j] = read_vector(change[j], model.mixture[j].front().x.size(), kMost,
+                                           at(here + "change", j));
+        model.effects.push_back(std::move(effect));
+    }
 }
 
 /// Earlier versions have none: their effects are mixed so that they are independent.
-void read_correlated(const nlohmann::json& spectrum, const std::string& place, Model& model) {
+void read_correlated(const ReadJson& spectrum, const std::string& place, Model& model) {
     const auto pairs = spectrum.find("effects_correlation");
     if (pairs == spectrum.end()) return;
+    const std::size_t count = model.effects.size();
     for (const auto& pair : *pairs) {
-        const estimator::uncertainty::Correlated one{
-            pair.at(0).get<std::size_t>(), pair.at(1).get<std::size_t>(), pair.at(2).get<double>()};
-        const std::size_t count = model.effects.size();
-        if (one.first >= count || one.second >= count || !(std::abs(one.value) <= 1 + 1e-9))
-            throw std::runtime_error(place + "effects_correlation: found " + pair.dump() +
-                                     ", expected two of " + std::to_string(count) +
-                                     " effects and a number from -1 to 1");
+        const bool whole = pair.is_array() && pair.size() == 3 && pair[0].is_number_unsigned() &&
+                           pair[1].is_number_unsigned() && pair[2].is_number();
+        const auto one = whole ? estimator::uncertainty::Correlated{pair[0].get<std::size_t>(),
+                                                                    pair[1].get<std::size_t>(),
+                                                                    pair[2].get<double>()}
+                               : estimator::uncertainty::Correlated{};
+        if (!whole || one.first >= count || one.second >= count ||
+            !(std::abs(one.value) <= 1 + 1e-9))
+            refuse(place + "effects_correlation", shown(pair),
+                   "two of " + std::to_string(count) + " effects and a number from -1 to 1");
         model.correlated.push_back(one);
     }
 }
@@ -276,27 +413,12 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
 
 Hypothesis read_hypothesis(const nlohmann::json& from) {
     Hypothesis one;
-    one.weight = from.at("w").get<double>();
-    if (!(one.weight > 0 && one.weight <= 1))
-        throw std::runtime_error("w: found " + from.at("w").dump() + ", expected a weight to 1");
-    const auto& hz = from.at("hz");
-    const auto& damping = from.at("damping");
-    if (hz.is_array()) {
-        for (std::size_t r = 0; r < hz.size(); ++r)
-            one.resonances.push_back({hz[r].get<double>(), damping.at(r).get<double>()});
-    } else if (hz.is_number()) {
-        one.resonances = {{hz.get<double>(), damping.get<double>()}};
-    }
-    one.x = read_vector(from.at("x"));
-    one.covariance = read_rows(from.at("p"));
-    const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
-    if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
-        throw std::runtime_error("found x of " + std::to_string(one.x.size()) + " and p of " +
-                                 std::to_string(one.covariance.rows()) + " x " +
-                                 std::to_string(one.covariance.cols()) + ", expected " +
-                                 std::to_string(columns) + " coefficients and a square");
-    if (!one.x.allFinite() || !one.covariance.allFinite())
-        throw std::runtime_error("x, p: found what is no number, expected numbers");
+    one.weight = read_number(member(from, "w", ""), "w", 0, 1);
+    one.resonances = read_resonances(from);
+    const auto resonances = static_cast<Index>(one.resonances.size());
+    const Index columns = kBase + kElastic * resonances;
+    one.x = read_vector(member(from, "x", ""), columns, kMost, "x");
+    one.covariance = read_covariance(member(from, "p", ""), columns, resonances);
     one.linearised = one.covariance.rows() > one.x.size();
     return one;
 }
@@ -307,45 +429,20 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
     const nlohmann::json& spectrum = member(root, "spectrum", path + ": ");
     const std::string place = path + ": spectrum.";
     Model model;
-    const auto& mixture = member(spectrum, "mixture", place);
-    const auto& effects = member(spectrum, "effects", place);
-    try {
-        read_frame(member(spectrum, "platform", place), model.frame);
-        for (std::size_t j = 0; j < 3; ++j) {
-            for (const auto& one : mixture.at(j)) {
-                try {
-                    model.mixture[j].push_back(read_hypothesis(one));
-                } catch (const std::runtime_error& error) {
-                    throw std::runtime_error(place + "mixture[" + std::to_string(j) + "][" +
-                                             std::to_string(model.mixture[j].size()) +
-                                             "]: " + error.what());
-                }
-            }
-            if (model.mixture[j].empty())
-                throw std::runtime_error(place + "mixture[" + std::to_string(j) +
-                                         "]: found it empty, expected hypotheses");
-        }
-        for (const auto& one : effects) {
-            Effect effect{one.at("input").get<std::string>(), "", {}};
-            for (std::size_t j = 0; j < 3; ++j) {
-                effect.change[j] = read_vector(one.at("change").at(j));
-                const auto& heaviest = model.mixture[j].front();
-                if (effect.change[j].size() != heaviest.x.size())
-                    throw std::runtime_error(
-                        place + "effects: found " + std::to_string(effect.change[j].size()) +
-                        " numbers, expected " + std::to_string(heaviest.x.size()));
-            }
-            model.effects.push_back(std::move(effect));
-        }
-        read_correlated(spectrum, place, model);
-        model.lowest_hz = member(spectrum, "lowest_hz", place).get<double>();
-        model.highest_hz = member(spectrum, "highest_hz", place).get<double>();
-        const auto& refusal = member(spectrum, "refusal", place);
-        if (refusal.is_string()) model.refusal = refusal.get<std::string>();
-    } catch (const nlohmann::json::exception& error) {
-        throw std::runtime_error(place + "mixture: " + error.what() +
-                                 ", expected the result of vibrig identify --json");
-    }
+    const auto& mixture = list_of(member(spectrum, "mixture", place), 3, place + "mixture");
+    for (std::size_t j = 0; j < 3; ++j)
+        model.mixture[j] = read_mixture(mixture[j], at(place + "mixture", j));
+    read_frame(member(spectrum, "platform", place), place + "platform.", model.frame);
+    read_effects(member(spectrum, "effects", place), place + "effects", model);
+    read_correlated(spectrum, place, model);
+    model.lowest_hz =
+        read_number(member(spectrum, "lowest_hz", place), place + "lowest_hz", 0, kMostHz);
+    model.highest_hz = read_number(member(spectrum, "highest_hz", place), place + "highest_hz",
+                                   model.lowest_hz, kMostHz);
+    const auto& refusal = member(spectrum, "refusal", place);
+    if (!refusal.is_null() && !refusal.is_string())
+        refuse(place + "refusal", shown(refusal), "a text or null");
+    if (refusal.is_string()) model.refusal = refusal.get<std::string>();
     return model;
 }
 

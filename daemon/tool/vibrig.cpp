@@ -5,6 +5,7 @@
 #include "daemon/tool/commands.hpp"
 #include "proto/command_tree.hpp"
 #include "proto/empty_value.hpp"
+#include "proto/named_files.hpp"
 
 int main(int argc, char** argv) {
     using namespace vibrig::tool;
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
           add_commission, add_journal,     add_pki})
         add(app, exit_code);
     vibrig::proto::refuse_empty_values(app);
+    vibrig::proto::keep_named_files(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(
             app, {{0, "done"}, {1, "the result says no"}, {kBadInput, "bad usage or input"}});

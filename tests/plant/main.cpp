@@ -9,6 +9,7 @@
 #include "proto/command_tree.hpp"
 #include "proto/dbc.hpp"
 #include "proto/empty_value.hpp"
+#include "proto/named_files.hpp"
 #include "tests/plant/commands.hpp"
 
 int main(int argc, char** argv) {
@@ -27,6 +28,7 @@ int main(int argc, char** argv) {
     bool print_dbc = false;
     app.add_flag("--print-dbc", print_dbc, "print the built-in rig.dbc, and end");
     vibrig::proto::refuse_empty_values(app);
+    vibrig::proto::keep_named_files(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::fputs(vibrig::proto::command_tree_json(
                        app, {{0, "done; judge: all coefficients within the limit"},

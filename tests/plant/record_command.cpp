@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "proto/durable_file.hpp"
 #include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
 #include "tests/plant/recording.hpp"
@@ -86,9 +87,11 @@ void add_record_command(CLI::App& app, int& exit_code) {
         o->plan.positions_deg = read_positions(o->positions);
         o->plan.order = parse_order(o->order);
         for (const std::string& text : o->sweeps) o->plan.sweep.push_back(parse_sweep(text));
+        std::optional<proto::OutputFile> whole;
         std::ofstream file;
         if (o->output != "-") {
-            file.open(o->output, std::ios::binary);
+            whole.emplace(o->output);
+            file.open(whole->place(), std::ios::binary);
             if (!file) throw PlantError(o->output + ": cannot be written");
         }
         std::ostream& out = o->output == "-" ? std::cout : file;
@@ -102,6 +105,8 @@ void add_record_command(CLI::App& app, int& exit_code) {
             });
         out.flush();
         if (!out) throw PlantError(o->output + ": cannot be written");
+        file.close();
+        if (whole) whole->finish();
         if (!o->write_mean.empty()) write_truth(mean, o->write_mean);
         std::fprintf(stderr, "%llu samples, seed %llu\n", static_cast<unsigned long long>(samples),
                      static_cast<unsigned long long>(truth.seed));

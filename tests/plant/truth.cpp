@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "proto/durable_file.hpp"
 #include "tests/plant/truth_fields.hpp"
 
 namespace vibrig::plant {
@@ -362,10 +363,7 @@ std::string to_json(const Truth& truth) {
 }
 
 void write_truth(const Truth& truth, const std::string& path) {
-    std::ofstream out(path, std::ios::binary);
-    out << to_json(truth);
-    out.flush();
-    if (!out) throw PlantError(path + ": cannot be written");
+    proto::write_output(path, to_json(truth));
 }
 
 }  // namespace vibrig::plant

@@ -57,6 +57,9 @@ int run(const Options& options) {
         throw std::runtime_error(
             "--mean: known-mean found without --known-mean, expected the mean rate in deg/h");
     }
+    if (request.mode != allan::MeanMode::known_mean && options.known_mean->count() > 0) {
+        throw std::runtime_error("--known-mean: found without --mean known-mean, expected both");
+    }
     if (!options.reference.empty()) {
         allan::Terms terms{};
         std::copy(options.reference.begin(), options.reference.end(), terms.begin());
@@ -83,9 +86,11 @@ int run(const Options& options) {
 
 void add_dynamic_options(CLI::App& command, Options& options) {
     AllanRequest& request = options.request;
-    command.add_option("--dynamic", request.window_s, "windows of W s: surface, traces, alarms")
-        ->type_name("W")
-        ->check(seconds());
+    CLI::Option* const dynamic =
+        command
+            .add_option("--dynamic", request.window_s, "windows of W s: surface, traces, alarms")
+            ->type_name("W")
+            ->check(seconds());
     command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)")
         ->check(number_in(0, 0.9999, "a number from 0 to 0.9999"));
     command
@@ -113,6 +118,8 @@ void add_dynamic_options(CLI::App& command, Options& options) {
         ->expected(static_cast<int>(allan::kTerms))
         ->delimiter(',')
         ->check(number_in(0, kLargestValue, "Q,N,B,K,R, each zero or above"));
+    for (const char* of_windows : {"--overlap", "--shape", "--mean", "--alpha", "--reference"})
+        command.get_option(of_windows)->needs(dynamic);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ void draw_budget(const uncertainty::Assessment& assessed, const std::string& pat
                          c.u > 0 ? c.correlation / (c.u * c.u) : uncertainty::kNone);
     }
     if (any) chart.curves.push_back(std::move(correlations));
-    plot::write_file(path, chart.svg());
+    plot::write_pictures(path, {{"budget", chart.svg()}});
 }
 
 int run(const UncertaintyOptions& options) {
@@ -141,7 +141,7 @@ void add_uncertainty(CLI::App& app, int& exit_code) {
                        "defaults apply, of a campaign its own");
     command.add_option("--coefficient", options.coefficient,
                        "the whole budget of this one only, such as D_IIx");
-    command.add_option("--plot", options.plot, "draw the parts of the budget: an SVG file");
+    command.add_option("--plot", options.plot, "an SVG file, or a folder: the parts of the budget");
     command.add_flag("--monte-carlo", options.monte_carlo,
                      "check the combined uncertainty by drawing the inputs (JCGM 101)");
     command.add_flag("--json", options.json, "print everything as JSON");

@@ -89,7 +89,7 @@ class Study {
             return hz ? c_.spectrum.mount.transmission(*hz)
                       : std::optional(c_.estimator.transmission);
         };
-        auto runs = plan::read_plan(path, transmission);
+        auto runs = plan::read_plan(path, transmission, c_.estimator.frequency_hz);
         plan::refuse_random(runs);
         for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
         return runs;

@@ -16,6 +16,8 @@ estimator::plan::Terms terms_without(const std::vector<std::string>& names) {
         }
         terms[static_cast<std::size_t>(at - all.begin())] = false;
     }
+    if (std::none_of(terms.begin(), terms.end(), [](bool has) { return has; }))
+        throw std::runtime_error("--without: found all ten terms, expected one left at least");
     return terms;
 }
 

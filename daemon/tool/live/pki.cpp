@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "daemon/tool/commands.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 
 namespace vibrig::tool {
@@ -39,11 +40,8 @@ constexpr const char* kRevoked = "revoked.crl";
 /// Keys are for their owner only, from the moment they exist.
 void write(const fs::path& path, const std::string& text, bool secret) {
     const mode_t before = ::umask(secret ? 0077 : 0022);
-    std::ofstream file(path, std::ios::binary);
+    proto::write_durably(path.string(), text, secret ? 0600 : 0644);
     ::umask(before);
-    file << text;
-    file.close();
-    if (!file) throw PkiError("cannot write " + path.string());
 }
 
 std::string read(const fs::path& path) {
@@ -51,6 +49,10 @@ std::string read(const fs::path& path) {
     std::ostringstream text;
     text << file.rdbuf();
     if (!file) throw PkiError("cannot read " + path.string());
+    if (text.str().empty())
+        throw PkiError(path.string() +
+                       ": found an empty file, expected a certificate or a key in PEM; bring it "
+                       "back from a copy, or take it away with the authority that goes with it");
     return text.str();
 }
 
@@ -120,9 +122,10 @@ int init(const PkiOptions& options) {
         const Identity made = serve::make_identity(
             {CertificateSettings::Use::client, name, role, {}, std::chrono::hours(-1), valid_for},
             &authority);
-        save(folder, name, made);
         write(folder / (name + ".p12"),
               serve::pkcs12_of(made, authority.certificate, name, options.password), true);
+        // The key last: where it is, the others are, and a second call begins anew without it.
+        save(folder, name, made);
         const std::string file = (folder / name).string();
         say(options, role + ": " + file + ".crt, .key; .p12 for a browser");
         all["people"].push_back({{"name", name},

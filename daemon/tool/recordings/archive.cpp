@@ -10,6 +10,7 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/json_text.hpp"
 
@@ -96,6 +97,8 @@ int add(const AddOptions& o) {
                     history = archive::Index(at.place.index, archive::Database::Mode::read)
                                   .results(filter);
                 }
+                // Archived as it is, so that vibrigd does not try for ever.
+                static_cast<void>(tell_missing_raw(folder));
                 tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
                               history.size(), o.json);
             } catch (const std::exception& error) {

@@ -1,15 +1,12 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 
 #include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <vector>
 
 #include "daemon/record/index.hpp"
 
 namespace vibrig::tool {
-
-namespace fs = std::filesystem;
 
 namespace {
 void tell_on_error(const std::string& words) { std::cerr << words << '\n'; }
@@ -31,18 +28,6 @@ record::Campaign read_named_campaign(const std::string& argument) {
         if (file == path) record::compare_with_index(record::folder_of(path), tell_on_error);
     }
     return record::read_campaign(path);
-}
-
-void keep_recordings(const std::string& output) {
-    std::error_code error;
-    const fs::path path = fs::weakly_canonical(output, error);
-    if (error || !fs::is_regular_file(path, error)) return;
-    const std::string name = path.filename().string();
-    const bool beside = !record::part_files(path.parent_path().string()).empty();
-    if (record::is_hdf5(path.string()) || name == "recordings.sqlite3" ||
-        (beside && (record::raw_number(name) > 0 || name == "dwells.csv" || name.ends_with(".h5"))))
-        throw std::runtime_error(output +
-                                 ": found a file of a recording, expected another to write");
 }
 
 bool tell_missing_raw(const std::string& folder) {

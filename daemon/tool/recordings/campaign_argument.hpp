@@ -20,8 +20,5 @@ inline constexpr const char* kCampaignHelp =
 [[nodiscard]] bool tell_missing_raw(const std::string& folder);
 /// Likewise which are there and not among `logs`.
 [[nodiscard]] bool tell_left_out(const std::string& folder, const std::vector<std::string>& logs);
-/// Refuses an output that is a file of a recording: an HDF5 file, or what lies beside one or beside
-/// the folders of campaigns. Throws std::runtime_error.
-void keep_recordings(const std::string& output);
 
 }  // namespace vibrig::tool

@@ -23,6 +23,7 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 
 namespace vibrig::tool {
@@ -223,7 +224,7 @@ int certify(const CertificateArguments& arguments) {
     issue.utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                        std::chrono::system_clock::now().time_since_epoch())
                        .count();
-    for (const char* kind : kKinds) keep_recordings(arguments.output + kind);
+    for (const char* kind : kKinds) proto::check_output(arguments.output + kind);
     if (!arguments.no_journal) look_for_daemon(arguments);
     const auto campaign = read_named_campaign(arguments.campaign);
     const auto result = nlohmann::ordered_json::parse(campaign.result_json, nullptr, false);

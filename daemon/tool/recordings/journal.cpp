@@ -33,6 +33,13 @@ std::vector<journal::Anchor> anchors_in(const std::string& argument) {
                                  "\", expected the whole line of a signed head");
     }
     std::vector<journal::Anchor> anchors;
+    const auto content = [&] {
+        try {
+            return proto::read_whole_file(argument, kLargestReport);
+        } catch (const std::runtime_error& error) {
+            throw std::runtime_error("--anchor: " + argument + ": " + error.what());
+        }
+    };
     const auto take = [&](const std::string& path, const std::string& text) {
         for (auto& head : journal::heads_in(text)) anchors.push_back({path, std::move(head)});
     };
@@ -42,7 +49,7 @@ std::vector<journal::Anchor> anchors_in(const std::string& argument) {
     } else if (record::is_hdf5(argument)) {
         take(argument, record::read_part_head(argument).head.journal_head);
     } else {
-        take(argument, proto::read_whole_file(argument, kLargestReport));
+        take(argument, content());
     }
     if (anchors.empty()) {
         throw std::runtime_error(

@@ -26,10 +26,10 @@ std::size_t hash_of(const matvar_t& variable) {
 
 void MatFile::Close::operator()(_mat_t* file) const noexcept { Mat_Close(file); }
 
-MatFile::MatFile(std::string path) : path_(std::move(path)) {
+MatFile::MatFile(std::string path) : path_(std::move(path)), out_(path_) {
     if (std::filesystem::exists(path_) && !std::filesystem::is_regular_file(path_))
         throw std::runtime_error(path_ + ": found no regular file, expected one or a new name");
-    file_.reset(Mat_CreateVer(path_.c_str(), nullptr, MAT_FT_MAT5));
+    file_.reset(Mat_CreateVer(out_.place().c_str(), nullptr, MAT_FT_MAT5));
     if (file_ == nullptr) throw std::runtime_error(path_ + ": cannot be written");
 }
 
@@ -60,13 +60,15 @@ void MatFile::write(const std::string& name, matvar_t* variable) {
 
 void MatFile::finish() {
     file_.reset();
-    const std::unique_ptr<_mat_t, Close> file(Mat_Open(path_.c_str(), MAT_ACC_RDONLY));
+    std::unique_ptr<_mat_t, Close> file(Mat_Open(out_.place().c_str(), MAT_ACC_RDONLY));
     for (const Added& added : added_) {
         const Variable found(file ? Mat_VarRead(file.get(), added.name.c_str()) : nullptr);
         if (!found || hash_of(*found) != added.hash)
             throw std::runtime_error(path_ + ": " + added.name +
                                      ": cannot be written whole; is the disk full?");
     }
+    file.reset();
+    out_.finish();
 }
 
 }  // namespace vibrig::tool

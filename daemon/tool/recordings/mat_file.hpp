@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "proto/durable_file.hpp"
+
 struct _mat_t;
 struct matvar_t;
 
@@ -20,7 +22,8 @@ class MatFile {
     /// `rows` of `width` numbers, row by row.
     void add(const std::string& name, const std::vector<double>& values, std::size_t width = 1);
     void add(const std::string& name, std::string text);
-    /// Closes the file and reads it back: its library does not tell of a full disk.
+    /// Closes the file, reads it back, as its library does not tell of a full disk, and gives it
+    /// its name.
     void finish();
 
   private:
@@ -35,6 +38,7 @@ class MatFile {
     void write(const std::string& name, matvar_t* variable);
 
     std::string path_;
+    proto::OutputFile out_;
     std::unique_ptr<_mat_t, Close> file_;
     std::vector<Added> added_;
 };

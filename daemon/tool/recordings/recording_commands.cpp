@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@
 #include "daemon/tool/recordings/export_csv.hpp"
 #include "daemon/tool/recordings/mat_file.hpp"
 #include "estimator/filter/angles.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 
 namespace vibrig::tool {
@@ -126,23 +129,28 @@ bool export_candump(const record::Campaign& campaign, const std::string& path, b
     if (files.empty())
         throw std::runtime_error(campaign.folder +
                                  ": found no raw-*.log, expected the campaign's raw log");
-    std::FILE* to = path == "-" ? stdout : std::fopen(path.c_str(), "wb");
+    std::optional<proto::OutputFile> out;
+    if (path != "-") out.emplace(path);
+    const auto close = [](std::FILE* file) { std::fclose(file); };
+    std::unique_ptr<std::FILE, decltype(close)> file(
+        out ? std::fopen(out->place().c_str(), "wb") : nullptr, close);
+    std::FILE* const to = out ? file.get() : stdout;
     if (to == nullptr) throw std::runtime_error(path + ": cannot be written");
     std::size_t bytes = 0;
     bool good = true;
-    for (const auto& file : files) {
+    for (const auto& segment : files) {
         PlainLines lines;
-        record::read_raw(file, [&](std::string_view piece) {
+        record::read_raw(segment, [&](std::string_view piece) {
             if (plain) piece = lines.of(piece);
             good = good && std::fwrite(piece.data(), 1, piece.size(), to) == piece.size();
             bytes += piece.size();
             return good;
         });
     }
-    good = (to == stdout ? std::fflush(to) : std::fclose(to)) == 0 && good;
+    good = (out ? std::fclose(file.release()) : std::fflush(stdout)) == 0 && good;
     if (!good) throw std::runtime_error(path + ": cannot be written");
-    if (to != stdout)
-        std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
+    if (out) out->finish();
+    if (out) std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
     return tell_missing_raw(campaign.folder);
 }
 
@@ -168,7 +176,7 @@ int export_campaign(const ExportOptions& options) {
                (format == "candump" || format == "wireshark" ? ".log" : "." + format);
         std::ranges::replace(path, '/', '_');
     }
-    keep_recordings(path);
+    proto::check_output(path);
     bool whole = true;
     if (format == "csv") {
         export_csv(campaign, path);

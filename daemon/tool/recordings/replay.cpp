@@ -67,6 +67,8 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
         if (arguments.files.size() > 1)
             throw std::runtime_error(arguments.files[1] +
                                      ": found a second campaign, expected one (or candump logs)");
+        if (!arguments.dwells.empty())
+            throw std::runtime_error("--dwells: found it with a campaign, expected candump logs");
         return read_named_campaign(first);
     }
     // Without words about it, what the recorder left beside the logs.
@@ -161,7 +163,10 @@ int replay(const ReplayArguments& arguments) {
     // Logs of other names are anybody's.
     const auto& files = arguments.files;
     bool whole = true;
-    if (std::ranges::all_of(files, record::raw_number)) {
+    if (std::ranges::none_of(files, is_log)) {
+        // Named when the campaign was read.
+        whole = record::missing_raw(campaign.folder, [](const auto&) {}).empty();
+    } else if (std::ranges::all_of(files, record::raw_number)) {
         const std::string folder = record::folder_of(files.front());
         whole = tell_missing_raw(folder);
         whole = tell_left_out(folder, files) && whole;

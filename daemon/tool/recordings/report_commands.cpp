@@ -28,6 +28,7 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/tool/simulated.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
@@ -96,8 +97,8 @@ void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
 }
 
 int make_report(const ReportArguments& arguments) {
-    keep_recordings(arguments.output);
-    keep_recordings(arguments.pdf);
+    proto::check_output(arguments.output);
+    proto::check_output(arguments.pdf);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
     const auto rig = rig_of(campaign, arguments.config);
@@ -127,7 +128,9 @@ int make_report(const ReportArguments& arguments) {
     plot::write_file(arguments.output, report::make_page(campaign, analysis, earlier));
     std::cerr << arguments.output << ": " << fs::file_size(arguments.output) / 1000 << " kB\n";
     if (!arguments.pdf.empty()) {
-        print_pdf(arguments.output, arguments.pdf);
+        proto::OutputFile pdf(arguments.pdf);
+        print_pdf(arguments.output, pdf.place());
+        pdf.finish();
         std::cerr << arguments.pdf << ": " << fs::file_size(arguments.pdf) / 1000 << " kB\n";
     }
     const auto& verdict = analysis.assessed.verdict;
@@ -338,7 +341,7 @@ int compensate(const CompensateArguments& arguments) {
     double level = 0;
     if (arguments.platform_g) level = level_of("--platform-g", *arguments.platform_g);
     if (arguments.table_g) level = level_of("--table-g", *arguments.table_g);
-    keep_recordings(arguments.output);
+    proto::check_output(arguments.output);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
     const auto rig = rig_of(campaign, arguments.config);

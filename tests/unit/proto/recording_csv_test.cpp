@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -291,6 +292,29 @@ TEST_F(Recording, BeginsANewDwellWhereAPairComesBack) {
     const std::string text = std::string(kHeader) + "5,1,1,0,0,0,0,0,0\n6,1,2,0,0,0,0,0,0\n";
     EXPECT_EQ(read(text + "7,1,1,0,0,0,0,0,0\n").size(), 3U);
     EXPECT_EQ(read(text + "4,1,1,0,0,0,0,0,0\n").size(), 3U);
+}
+
+TEST_F(Recording, RefusesADwellThatIsThereTwice) {
+    // GIVEN two dwells of 100 rows, the second with times that begin anew
+    const auto dwell = [](int position, double noise, std::size_t rows) {
+        std::string text;
+        for (std::size_t i = 0; i < rows; ++i)
+            text += std::to_string(0.025 * static_cast<double>(i)) + ",1," +
+                    std::to_string(position) + ",0,0,0," +
+                    std::to_string(noise * std::sin(static_cast<double>(i))) + ",1,0\n";
+        return text;
+    };
+    const std::string two = kHeader + dwell(1, 0.1, 100) + dwell(2, 0.2, 100);
+    EXPECT_EQ(read(two).size(), 200U);
+    // WHEN the first comes again, cut short, or under another position, THEN both are named
+    EXPECT_EQ(error(two + dwell(1, 0.1, 60)),
+              ":202: found run 1, position 1 with the times and samples of the dwell of line 2, "
+              "expected each dwell once");
+    EXPECT_EQ(error(two + dwell(3, 0.2, 100)),
+              ":202: found run 1, position 3 with the times and samples of the dwell of line 102, "
+              "expected each dwell once");
+    // Other noise at the same times is another dwell.
+    EXPECT_EQ(read(two + dwell(1, 0.11, 100)).size(), 300U);
 }
 
 TEST_F(Recording, ReadsOtherSeparatorsAndDecimalCommasWhereTheyAreUnambiguous) {

@@ -111,6 +111,16 @@ TEST_F(ArchiveIndex, RefusesANewerVersionByName) {
     }
 }
 
+TEST_F(ArchiveIndex, LeavesAnothersDatabaseAsItIs) {
+    journal::Database(path_).execute("CREATE TABLE event (text TEXT)");
+    EXPECT_THROW(Index(path_, Database::Mode::write), ArchiveError);
+    EXPECT_THROW(record::Index(folder_, [](const auto&) {}), journal::DatabaseError);
+    // It was neither made anew nor added to.
+    const auto names = journal::Database(path_).ask("SELECT name FROM sqlite_master");
+    ASSERT_EQ(names.size(), 1U);
+    EXPECT_EQ(names[0].texts.at(0), "event");
+}
+
 TEST_F(ArchiveIndex, GivesBackWhatItWasGiven) {
     Entry one = entry_of("17", 1, -1.25e-7, 3e-9);
     one.coefficients[4].reset();

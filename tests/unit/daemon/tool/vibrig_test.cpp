@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -37,6 +38,62 @@ TEST_F(VibrigOptions, AnEmptyValueIsNoDefault) {
     EXPECT_NE(error.find("--config: found nothing"), std::string::npos) << error;
     EXPECT_EQ(run(VIBRIG_PLANT, "record -o x.csv --truth ''"), 2);
     EXPECT_NE(error.find("--truth: found nothing"), std::string::npos) << error;
+}
+
+TEST_F(VibrigOptions, AnOutputIsNoInputAndNoRecording) {
+    // GIVEN what is read, and a campaign
+    const std::string rows = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+    write("rec.csv", rows);
+    write("v.toml", "# a rig\n");
+    std::filesystem::create_directories(folder_ / "c");
+    write("c/campaign.h5", "of a campaign");
+    std::filesystem::create_symlink("c/campaign.h5", folder_ / "link.svg");
+    // WHEN it is to be written THEN nothing is
+    for (const char* const arguments :
+         {"uncertainty rec.csv --plot rec.csv", "uncertainty c --plot c/campaign.h5",
+          "identify rec.csv --plot rec.csv", "replay c --plot link.svg",
+          "plan --runs 14 -o c/campaign.h5", "plan --config v.toml -o v.toml",
+          "plan --config v.toml -o ./c/../v.toml", "allan rec.csv --plot rec.csv"}) {
+        expect_refusal(arguments, "expected another to write");
+    }
+    for (const char* const arguments : {"-o c/campaign.h5", "-o x.csv --write-truth c/campaign.h5",
+                                        "-o x.csv --truth v.toml --write-mean v.toml"}) {
+        EXPECT_EQ(run(VIBRIG_PLANT, std::string("record --dwell 1 ") + arguments), 2) << arguments;
+        EXPECT_NE(error.find("expected another to write"), std::string::npos) << error;
+    }
+    EXPECT_EQ(content("rec.csv"), rows);
+    EXPECT_EQ(content("v.toml"), "# a rig\n");
+    EXPECT_EQ(content("c/campaign.h5"), "of a campaign");
+    // AND a plan that cannot be taken leaves the recording that was there
+    EXPECT_EQ(run(VIBRIG_PLANT, "record -o rec.csv --order 99.1"), 2);
+    EXPECT_EQ(content("rec.csv"), rows);
+    // AND what is no file is written as it is
+    ASSERT_EQ(vibrig("plan --runs 14 --seed 1 -o /dev/fd/3 3>third"), 0) << error;
+    EXPECT_NE(content("third").find("\"runs\""), std::string::npos);
+}
+
+TEST_F(VibrigOptions, WhatCannotBeReadIsNamed) {
+    write("cut.json", "{\n  \"parameters\": [1,");
+    std::filesystem::create_directories(folder_ / "folder");
+    expect_refusal("predict folder --profile truck --attitude 0,0,0",
+                   "folder: cannot be read, expected a JSON file");
+    expect_refusal("predict cut.json --profile truck --attitude 0,0,0",
+                   "cut.json: found no JSON, expected it; line 2, column 20");
+    expect_refusal("plan --about folder", "folder: cannot be read");
+    write("j", "");
+    expect_refusal("journal verify j --anchor nosuch", "nosuch: cannot be opened");
+    expect_refusal("replay folder --dwells rec.csv", "--dwells: found it with a campaign");
+}
+
+TEST_F(VibrigOptions, AnEmptyKeyOfAnAuthorityIsNamed) {
+    // GIVEN what a full disk had left
+    std::filesystem::create_directories(folder_ / "p");
+    write("p/authority.crt", "");
+    write("p/authority.key", "");
+    expect_refusal("pki init --folder p --viewer wall", "p/authority.crt: found an empty file");
+    // WHEN it is taken away, THEN a certificate without its key is none
+    std::filesystem::remove(folder_ / "p/authority.key");
+    EXPECT_EQ(vibrig("pki init --folder p --viewer wall"), 0) << error;
 }
 
 TEST_F(VibrigOptions, EachProgramSaysItsNameAndVersion) {

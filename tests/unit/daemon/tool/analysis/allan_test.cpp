@@ -220,6 +220,10 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal(window + "--reference 0,0,0,0,0", {"--reference", "five zeros"});
     expect_refusal(window + "--known-mean nan", {"--known-mean", "nan"});
     expect_refusal(window + "--mean known-mean", {"--mean", "without --known-mean"});
+    expect_refusal(window + "--known-mean 3", {"--known-mean", "without --mean known-mean"});
+    for (const char* const of_windows : {"--overlap 0.3", "--shape hann", "--mean corrected",
+                                         "--alpha 0.1", "--reference 0,1,0,0,0"})
+        expect_refusal(one + of_windows, {"--dynamic"});
     expect_refusal("allan ok.txt --tau0 1 --plot none/x.svg", {"none/x.svg"});
 }
 

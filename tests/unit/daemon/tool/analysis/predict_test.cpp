@@ -517,10 +517,10 @@ TEST_F(Predict, ADamagedResultIsNamedByItsPlace) {
         const Ended ended = run("predict damaged.json --profile truck --attitude 0,0,0");
         EXPECT_EQ(ended.exit_code, 2) << ended.out;
         EXPECT_THAT(ended.error,
-                    HasSubstr(std::string("damaged.json: spectrum.mixture[1][0]: ") + message));
+                    HasSubstr(std::string("damaged.json: spectrum.mixture[1][0].") + message));
     };
-    damaged([](PredictJson& one) { one["p"].erase(0); }, "found x of 16 and p of 15 x 16");
-    damaged([](PredictJson& one) { one["x"].erase(0); }, "found x of 15 and p of 16 x 16");
+    damaged([](PredictJson& one) { one["p"].erase(0); }, "p: found 15 entries, expected 16");
+    damaged([](PredictJson& one) { one["x"].erase(0); }, "x: found 15 entries, expected 16");
     damaged([](PredictJson& one) { one["w"] = -0.5; }, "w: found -0.5");
     damaged([](PredictJson& one) { one["w"] = 3; }, "w: found 3");
 }

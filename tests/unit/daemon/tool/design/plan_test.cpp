@@ -100,6 +100,15 @@ TEST_F(PlanCommand, NumbersHaveToBeFiniteAndWithinReason) {
     }
 }
 
+TEST_F(PlanCommand, ARecordingIsNoListOfPositions) {
+    write("rec.csv",
+          "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n0,1,1,0,0,0,0,1,0\n");
+    EXPECT_EQ(vibrig("plan --positions rec.csv"), 2);
+    EXPECT_NE(error.find("rec.csv: found a recording (columns time_s and run), expected"),
+              std::string::npos)
+        << error;
+}
+
 TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     ASSERT_EQ(vibrig("plan --runs 14 --outer -60,60 --azimuth -100,100 --levels 0,6 --json"), 0)
         << error;
@@ -135,6 +144,17 @@ TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     EXPECT_EQ(json()["rank"], 10);
 }
 
+TEST_F(PlanCommand, AModelWithoutTermsIsRefused) {
+    for (const char* other : {"", " --turntable", " --evaluate plan.csv"}) {
+        EXPECT_EQ(vibrig(std::string("plan --without D0,D1,D2,D3,D11,D22,D33,D12,D13,D23") + other),
+                  2)
+            << other;
+        EXPECT_NE(error.find("--without: found all ten terms, expected one left at least"),
+                  std::string::npos)
+            << error;
+    }
+}
+
 TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
     write("nan.csv", "alpha_deg,beta_deg,gamma_deg\n0,0,0\n0,nan,0\n");
     write("lock.csv", "alpha_deg,beta_deg,gamma_deg\n0,85,0\n");
@@ -147,6 +167,13 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
           R"({"runs":[{"position":[0,0,0],"level_g":6,"table_g":9},
                       {"position":[0,45,0],"profile":"road","level_db":-3}]})");
     write("random.csv", "alpha_deg,beta_deg,gamma_deg,level_g,profile,level_db\n0,0,0,0,road,0\n");
+    const std::string run = R"({"position":[0,0,0],"table_g":9)";
+    write("key.json", R"({"runs":[)" + run + R"(,"freqency_hz":30}]})");
+    write("top.json", R"({"runs":[)" + run + R"(}],"frequency":30})");
+    write("many.json", R"({"runs":[)" + run + R"(,"count":1000000000}]})");
+    write("dwell.json", R"({"dwell_s":0,"runs":[)" + run + "}]}");
+    write("hz.json", R"({"frequency_hz":30,"runs":[)" + run + "}]}");
+    write("pads.json", R"({"transmission":0.9,"runs":[)" + run + "}]}");
     write("limit.toml", "shaker.limits.acceleration_g = 5\n");
     struct Case {
         const char* arguments;
@@ -154,12 +181,26 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
     };
     for (const Case& c :
          {Case{"--runs 9", "9 runs for 10 coefficients: 10 are needed"},
-          Case{"--levels 0,-1", "--levels: found -1"}, Case{"--levels 0,nan", "--levels: found"},
+          Case{"--levels 0,-1", "--levels: found -1"},
+          Case{"--levels 0,nan", "--levels: found"},
           Case{"--positions nan.csv", "nan.csv:3: column beta_deg: found 'nan'"},
           Case{"--positions lock.csv", "lock.csv:2"},
           Case{"--positions short.csv", "no column gamma_deg"},
-          Case{"--positions empty.csv", "empty.csv"}, Case{"--positions none.csv", "none.csv"},
+          Case{"--positions empty.csv", "empty.csv"},
+          Case{"--positions none.csv", "none.csv"},
           Case{"--evaluate bad.json", "runs[0].position"},
+          Case{"--evaluate key.json",
+               "key.json: runs[0].freqency_hz: found an unknown key, "
+               "expected a known one, perhaps frequency_hz"},
+          Case{"--evaluate top.json", "top.json: plan.frequency: found an unknown key, expected"},
+          Case{"--evaluate many.json", "expected a whole number from 1 to 100000"},
+          Case{"--evaluate dwell.json", "plan.dwell_s: found 0.0, expected more than 0 s"},
+          Case{"--evaluate hz.json",
+               "plan.frequency_hz: found 30.0 Hz, and runs without one of "
+               "their own, expected the configuration's "
+               "vibration.frequency_hz, 15.0 Hz"},
+          Case{"--evaluate pads.json",
+               "plan.transmission: found 0.9, expected the configuration's"},
           Case{"--evaluate cut.json", "cut.json: not JSON: parse error at line 1, column 16\n"},
           Case{"--evaluate levels.json", "transmission 0.6667"},
           Case{"--evaluate random.json", "runs[1].profile: found road, expected a sine"},
