@@ -25,22 +25,18 @@ constexpr double kAtRestG = 1e-9;
 
 std::string number(double value) { return Json(value).dump(); }
 
-/// A misspelt key would leave the rig to its configuration without a word.
+/// A misspelt key would leave the rig to its configuration without a word. What resembles none, a
+/// remark of somebody's, may stand there.
 void refuse_unknown(const Json& object, std::initializer_list<std::string_view> known,
                     const std::string& place) {
-    constexpr std::size_t kLongest = 100, kMostEdits = 3;
+    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
     for (const auto& [key, value] : object.items()) {
-        if (std::ranges::find(known, key) != known.end()) continue;
-        std::string_view near;
-        std::size_t fewest = kMostEdits + 1;
+        if (key.size() > kLongest || std::ranges::find(known, key) != known.end()) continue;
         for (const std::string_view name : known) {
-            const std::size_t edits = key.size() > kLongest ? fewest : proto::edits(key, name);
-            if (edits >= fewest) continue;
-            fewest = edits;
-            near = name;
+            if (proto::edits(key, name) * kLettersPerEdit <= key.size())
+                refuse(place + "." + proto::printable(key), "an unknown key",
+                       "a known one, perhaps " + std::string(name));
         }
-        refuse(place + "." + proto::printable(key), "an unknown key",
-               near.empty() ? "a known one" : "a known one, perhaps " + std::string(near));
     }
 }
 
