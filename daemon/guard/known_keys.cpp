@@ -8,7 +8,7 @@ namespace vibrig::guard {
 namespace {
 
 /// Table, and the names in it.
-constexpr std::pair<const char*, const char*> kKeys[] = {
+constexpr std::pair<const char*, const char*> kByTable[] = {
     {"accelerometer", "bandwidth_hz order range_g response skew_ms"},
     {"can", "join_deadline_ms samples_per_frame stale_deadline_ms"},
     {"can.signals",
@@ -54,7 +54,7 @@ std::set<std::string> registers(std::set<std::string> names) {
 const std::set<std::string>& keys_of_the_daemon() {
     static const std::set<std::string> all = [] {
         std::set<std::string> names;
-        for (const auto& [table, list] : kKeys) {
+        for (const auto& [table, list] : kByTable) {
             std::istringstream words(list);
             for (std::string name; words >> name;) names.insert(table + ("." + name));
         }
