@@ -86,9 +86,9 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
                            can.interface);
     // First: what is proved of a rig that is not the one described says little.
     if (auto why = book_.refusal(utc_now(), last_part_for(request)); !why.empty()) return why;
-    if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (request.kind == CommandRequest::Kind::selftest && first_shaking())
         if (auto why = registers_not_tried(); !why.empty()) return why;
+    if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (auto why = device_not_known(); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))

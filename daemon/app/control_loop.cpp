@@ -37,6 +37,7 @@ void ControlLoop::run() {
         watch_outside();
         interlock_.filter(rig_.excitation() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         watch_device(now);
+        watch_untried(now);
         take_commands(now);
         watch_attendance(now);
         if (shut_down_.load()) campaign_.shut_down(now);

@@ -80,9 +80,8 @@ class Campaign {
     /// The next proof goes up from 0.03 g, each rung held against the command before the next:
     /// nobody has seen yet what this shaker makes of a number.
     void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
-    /// Before the first step(): nothing but a stop is written to the shaker's controller in this
-    /// life.
-    void hold_writes() noexcept;
+    /// From now on, or no longer, nothing but a stop is written to the shaker's controller.
+    void hold_writes(bool on) noexcept;
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// The highest level that the arming is for, peak at the table, as somebody measures it who
     /// takes the platform's motion for the table's by the reference frequency's transmission:

@@ -38,9 +38,9 @@ double Campaign::highest_seen() const {
     return whole ? largest * highest_level() : highest_g;
 }
 
-void Campaign::hold_writes() noexcept {
-    writes_held_ = true;
-    ports_.rig.shaker.read_only(true);
+void Campaign::hold_writes(bool on) noexcept {
+    writes_held_ = on;
+    ports_.rig.shaker.read_only(on || commissioning());
 }
 
 void Campaign::watch_stop(Time now) {
