@@ -747,9 +747,10 @@ def nothing_is_written(checks, programs, folder):
         checks.check(run.returncode == 0 and found["outcome"] == "decided" and before > 0 and seen and seen[-1] - seen[0] > 5,
                      f"a rig is commissioned through it, for {seen[-1] - seen[0] if seen else 0:.0f} s", run.stderr)
         checks.check(not within, "and nothing is written meanwhile", within[:5])
+        u.registers_are_tried()
         known = len(u.proxy.writes)
         u.rig.wait_for(lambda s: len(u.proxy.writes) > known, 10)
-        checks.check(len(u.proxy.writes) > known, "afterwards its watchdog is fed again")
+        checks.check(len(u.proxy.writes) > known, "afterwards, its registers tried, its watchdog is fed")
         # A stop is written whoever commissions it.
         child = r.Child("again", [u.rig.program("vibrig"), "commission", "--by", "Ada", "--answers", u.answers(), "--socket", u.rig.socket], folder)
         u.rig.wait_for(lambda s: s["campaign"]["state"] == "commissioning", 20)
