@@ -122,6 +122,16 @@ OutputFile::OutputFile(const std::string& path) : path_(path), target_(end_of_li
     if (target_.empty()) return;
     check_output(place_);
     ::unlink(place_.c_str());
+    const int file =
+        ::open(place_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    const int why = errno;
+    if (file >= 0) {
+        ::close(file);
+    } else if (::access(target_.c_str(), W_OK) == 0) {  // a file of one's own in another's folder
+        place_ = std::exchange(target_, {});
+    } else {
+        cannot(path_, "written", why);
+    }
 }
 
 OutputFile::~OutputFile() {

@@ -11,7 +11,7 @@ namespace vibrig::proto {
 namespace {
 
 // "VbD1", "VbG1": kind and version.
-constexpr std::uint32_t kDaemonKind = 0x31446256;
+constexpr std::uint32_t kDaemonKind = 0x32446256;
 constexpr std::uint32_t kGuardKind = 0x31476256;
 
 /// Little endian, one field after the other.
@@ -76,6 +76,7 @@ std::array<std::uint8_t, kDaemonWordBytes> encode(const DaemonWord& word) noexce
     for (const auto progress : word.progress) to.put(progress, 8);
     to.put(word.level_g);
     to.put(word.acknowledged, 8);
+    to.put(word.platform_ratio);
     return bytes;
 }
 
@@ -106,7 +107,9 @@ std::optional<DaemonWord> decode_daemon_word(std::span<const std::uint8_t> bytes
     for (auto& progress : word.progress) progress = from.get(8);
     word.level_g = from.number();
     word.acknowledged = from.get(8);
+    word.platform_ratio = from.number();
     if (flags > 7 || !is_level(word.level_g)) return {};
+    if (!(word.platform_ratio >= 1 && word.platform_ratio <= 1000)) return {};
     return word;
 }
 

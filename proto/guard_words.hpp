@@ -32,6 +32,9 @@ struct DaemonWord {
     bool stop_ordered = false;  ///< a stop that is not confirmed yet
     double level_g = 0;         ///< highest level of the arming, peak at the table; 0: not armed
     std::uint64_t acknowledged = 0;  ///< number of the guard's finding that a person acknowledged
+    /// So many times more than by the reference frequency's transmission the platform may show of
+    /// that level: a plan's other vibration may get through better.
+    double platform_ratio = 1;
     bool operator==(const DaemonWord&) const = default;
 };
 
@@ -49,13 +52,13 @@ struct GuardWord {
     bool operator==(const GuardWord&) const = default;
 };
 
-inline constexpr std::size_t kDaemonWordBytes = 64;
+inline constexpr std::size_t kDaemonWordBytes = 72;
 inline constexpr std::size_t kGuardWordBytes = 32;
 
 [[nodiscard]] std::array<std::uint8_t, kDaemonWordBytes> encode(const DaemonWord& word) noexcept;
 [[nodiscard]] std::array<std::uint8_t, kGuardWordBytes> encode(const GuardWord& word) noexcept;
 /// Nothing for a packet of another length, kind or version, for flags that do not exist and for a
-/// level that is not finite or below 0.
+/// level that is not finite or below 0, or a ratio that is not 1 to 1000.
 [[nodiscard]] std::optional<DaemonWord> decode_daemon_word(
     std::span<const std::uint8_t> bytes) noexcept;
 [[nodiscard]] std::optional<GuardWord> decode_guard_word(

@@ -115,16 +115,20 @@ class RecordingReader::Rows {
       public:
         void begin(std::size_t line) {
             line_ = line;
-            rows_ = 0;
+            rows_ = changes_ = 0;
             hash_ = kFnvOffset;
         }
         /// The line where the same samples began before; 0: they are new, or too few to tell yet.
         [[nodiscard]] std::size_t add(const RecordingRow& row) {
             if (rows_ == kTold) return 0;
             mix(row.time_s);
+            const auto before = std::exchange(readings_, {row.angle_deg, row.force_g});
             for (const double angle : row.angle_deg) mix(angle);
             for (const double force : row.force_g) mix(force);
+            if (rows_ > 0 && readings_ != before) ++changes_;
             if (++rows_ < kTold) return 0;
+            // Instruments too coarse for the noise show nothing by which one dwell is another.
+            if (2 * changes_ < kTold) return 0;
             const auto [known, fresh] = begun_.emplace(hash_, line_);
             return fresh ? 0 : known->second;
         }
@@ -139,7 +143,8 @@ class RecordingReader::Rows {
             hash_ ^= hash_ >> 32U;
         }
 
-        std::size_t line_ = 0, rows_ = 0;
+        std::size_t line_ = 0, rows_ = 0, changes_ = 0;
+        std::pair<std::array<double, 3>, std::array<double, 3>> readings_{};
         std::uint64_t hash_ = kFnvOffset;
         std::unordered_map<std::uint64_t, std::size_t> begun_;  ///< lines by their first rows
     };

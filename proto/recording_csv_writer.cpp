@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 
 #include "proto/durable_file.hpp"
 #include "proto/recording_csv.hpp"
@@ -74,7 +76,13 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
     const auto fail = [&](const char* what) {
         throw RecordingError(path, 0, "", std::string(what) + std::strerror(errno));
     };
-    OutputFile out(path);
+    std::optional<OutputFile> whole;
+    try {
+        whole.emplace(path);
+    } catch (const std::runtime_error& error) {  // "PATH: ..."
+        throw RecordingError(path, 0, "", std::string(error.what()).substr(path.size() + 2));
+    }
+    OutputFile& out = *whole;
     std::unique_ptr<std::FILE, Close> file(std::fopen(out.place().c_str(), "wb"));
     if (!file) fail("cannot be opened for writing: ");
     const Extras extras(rows, simulated, profiles);

@@ -37,7 +37,6 @@ void ControlLoop::run() {
         watch_outside();
         interlock_.filter(rig_.excitation() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         watch_device(now);
-        watch_untried(now);
         take_commands(now);
         watch_attendance(now);
         if (shut_down_.load()) campaign_.shut_down(now);
@@ -78,7 +77,7 @@ void ControlLoop::show(Time now) {
     status_.interlock.latches = latches_.open();
     status_.noise = dwells_.noise();
     const bool armed = !campaign_.armed_by().empty();
-    outside_.armed(armed, armed ? campaign_.highest_seen() : 0);
+    outside_.armed(armed, armed ? campaign_.highest_level() : 0, campaign_.platform_ratio());
 }
 
 void ControlLoop::watch_outside() {

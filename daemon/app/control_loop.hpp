@@ -140,7 +140,6 @@ class ControlLoop {
                                            const commission::Json& what);
     [[nodiscard]] std::string registers_not_tried() const;
     void keep_trials();
-    void watch_untried(drivers::Time now);
     void keep_voided();
     void void_gyros(const std::string& why);
 
@@ -174,9 +173,7 @@ class ControlLoop {
         drivers::Time steady = 0;  ///< when the tool was last there
     };
     std::optional<Attendance> attendance_;
-    std::string device_;    ///< the identity that the shaker's controller reports; empty: not known
-    bool untried_ = false;  ///< the registers: nothing but a stop is written
-    drivers::Time look_at_trials_ = 0;
+    std::string device_;  ///< the identity that the shaker's controller reports; empty: not known
     std::size_t proofs_taken_ = 0;  ///< into the record, of the campaign's
     /// An arming that the journal is writing.
     struct Arming {

@@ -35,20 +35,10 @@ std::string ControlLoop::registers_not_tried() const {
 
 void ControlLoop::hold_untried_registers() {
     const auto why = first_shaking() ? registers_not_tried() : std::string();
-    if (untried_ == !why.empty()) return;
-    untried_ = !why.empty();
-    campaign_.hold_writes(untried_);
-    log(untried_ ? Severity::warning : Severity::info, "shaker",
-        untried_
-            ? "nothing but a stop is written to the controller, its watchdog is not fed: " + why
-            : "its registers were tried: it is written to, and its watchdog fed");
-}
-
-/// They may be tried meanwhile, a second is soon enough.
-void ControlLoop::watch_untried(Time now) {
-    if (!untried_ || now < look_at_trials_) return;
-    look_at_trials_ = now + drivers::kSecond;
-    hold_untried_registers();
+    if (why.empty()) return;
+    campaign_.hold_writes();
+    log(Severity::warning, "shaker",
+        "nothing but a stop is written to the controller, its watchdog is not fed: " + why);
 }
 
 /// At the start: what was written to the controller meanwhile, without a daemon.

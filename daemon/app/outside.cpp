@@ -22,9 +22,10 @@ void Outside::open() {
         guard_link_ = std::make_unique<watch::GuardLink>(path, [this] { return word(); });
 }
 
-void Outside::armed(bool by_somebody, double highest_g) noexcept {
+void Outside::armed(bool by_somebody, double highest_g, double platform_ratio) noexcept {
     armed_.store(by_somebody);
     armed_g_.store(highest_g);
+    platform_ratio_.store(platform_ratio);
 }
 
 void Outside::acknowledge() {
@@ -49,6 +50,7 @@ proto::DaemonWord Outside::word() {
     word.excitation = rig_.excitation();
     word.stop_ordered = campaign_.stopping();
     word.level_g = armed_g_.load();
+    word.platform_ratio = platform_ratio_.load();
     return word;
 }
 
@@ -84,7 +86,9 @@ void Outside::watch(bool tripped, bool alarm) {
         if (cause != proto::GuardCause::none && std::exchange(guard_finding_, number) != number)
             events_.log(Severity::trip, "guard",
                         fmt::format("{}: {}", proto::name_of(cause), proto::text_of(cause)));
-        if (std::exchange(guard_was_disobeyed_, guard.disobeyed) != guard.disobeyed &&
+        // What it said last holds until it says something else.
+        if (guard.heard &&
+            std::exchange(guard_was_disobeyed_, guard.disobeyed) != guard.disobeyed &&
             guard.disobeyed)
             annunciator_->announce(HornPattern::disobeyed,
                                    proto::text_of(proto::GuardCause::stop_disobeyed));

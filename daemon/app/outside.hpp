@@ -39,7 +39,7 @@ class Outside {
     /// What the guard has found was seen by a person.
     void acknowledge();
     /// For the guard: by a named person, up to this level, peak at the table; 0: nothing is.
-    void armed(bool by_somebody, double highest_g) noexcept;
+    void armed(bool by_somebody, double highest_g, double platform_ratio) noexcept;
     /// Any thread.
     void fill(StatusData& status) const;
 
@@ -63,7 +63,7 @@ class Outside {
     bool guard_was_heard_ = false, guard_was_disobeyed_ = false;
     std::uint64_t guard_finding_ = 0;  ///< the one that tripped
     std::atomic<bool> armed_{false};
-    std::atomic<double> armed_g_{0};
+    std::atomic<double> armed_g_{0}, platform_ratio_{1};
     std::array<std::uint64_t, 2> marks_{};  ///< guard link's thread
 };
 

@@ -80,13 +80,16 @@ class Campaign {
     /// The next proof goes up from 0.03 g, each rung held against the command before the next:
     /// nobody has seen yet what this shaker makes of a number.
     void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
-    /// From now on, or no longer, nothing but a stop is written to the shaker's controller.
-    void hold_writes(bool on) noexcept;
+    /// Before the first step(): nothing but a stop is written to the shaker's controller in this
+    /// life.
+    void hold_writes() noexcept;
     CommandReply command(const CommandRequest& request, drivers::Time now);
-    /// The highest level that the arming is for, peak at the table, as somebody measures it who
-    /// takes the platform's motion for the table's by the reference frequency's transmission:
-    /// where a plan's other vibration gets through better he sees more.
-    [[nodiscard]] double highest_seen() const;
+    /// The highest level that the arming is for, peak at the table; of random vibration the peaks
+    /// that it hardly goes beyond.
+    [[nodiscard]] double highest_level() const;
+    /// So many times more the platform may show of it than by the reference frequency's
+    /// transmission: a plan's other vibration may get through better. 1 or above.
+    [[nodiscard]] double platform_ratio() const { return platform_ratio_; }
     /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
     /// another command.
     [[nodiscard]] std::string refusal(const CommandRequest& request, drivers::Time now) const;
@@ -222,8 +225,7 @@ class Campaign {
     }
     /// True: it has paused, since that is asked for.
     [[nodiscard]] bool not_valid_so_far(drivers::Time now);
-    /// That the arming is for, peak at the table.
-    [[nodiscard]] double highest_level() const;
+    [[nodiscard]] static double ratio_at_platform(const Settings& settings);
     void watch_stop(drivers::Time now);
     void begin(const std::string& by, drivers::Time now);
     void conclude(drivers::Time now);
@@ -266,6 +268,7 @@ class Campaign {
     [[nodiscard]] bool active() const;
 
     Settings settings_;
+    const double platform_ratio_ = ratio_at_platform(settings_);
     StageTimes times_;
     Ports ports_;
     StopMonitor stop_;

@@ -22,25 +22,21 @@ double Campaign::highest_level() const {
     return highest_g;
 }
 
-double Campaign::highest_seen() const {
-    const auto& rig = settings_.rig;
+double Campaign::ratio_at_platform(const Settings& settings) {
+    const auto& rig = settings.rig;
     const double reference =
         rig.transmission * std::sqrt(rig.accelerometer_response.power(rig.frequency_hz));
-    double highest_g = 0, largest = 1;
-    for (const Stop& stop : settings_.stops) {
-        double shown = stop.transmission;
-        for (const double along : stop.along) shown = std::max(shown, along);
-        const double ratio = std::max(1.0, shown / reference);
-        largest = std::max(largest, ratio);
-        highest_g = std::max(highest_g, (stop.random ? 3 : 1) * stop.table_g * ratio);
+    double largest = 1;
+    for (const Stop& stop : settings.stops) {
+        largest = std::max(largest, stop.transmission / reference);
+        for (const double along : stop.along) largest = std::max(largest, along / reference);
     }
-    const bool whole = state_ == State::checking || settings_.stops.empty();
-    return whole ? largest * highest_level() : highest_g;
+    return largest;
 }
 
-void Campaign::hold_writes(bool on) noexcept {
-    writes_held_ = on;
-    ports_.rig.shaker.read_only(on || commissioning());
+void Campaign::hold_writes() noexcept {
+    writes_held_ = true;
+    ports_.rig.shaker.read_only(true);
 }
 
 void Campaign::watch_stop(Time now) {

@@ -59,8 +59,10 @@ GuardCause Judge::find(const Evidence& e, const Moment& now) noexcept {
     if (e.word && !silent && !allowed && moving && !in_grace) return GuardCause::unarmed_motion;
     const double level = e.word ? std::min(e.word->level_g, settings_.limit_g) : 0;
     const double most = std::max(level * std::pow(10.0, safety::kOverArmed_dB / 20), kLeastLevel_g);
-    if (over_.for_s(allowed && e.sight.known() && e.sight.table_g > most, now,
-                    safety::kOverArmed_s))
+    // The table shows what was armed; the platform may show more of a plan's other vibration.
+    const double seen =
+        e.word ? std::max(e.sight.table.peak_g, e.sight.by_platform_g / e.word->platform_ratio) : 0;
+    if (over_.for_s(allowed && e.sight.known() && seen > most, now, safety::kOverArmed_s))
         return GuardCause::over_level;
     return GuardCause::none;
 }

@@ -159,7 +159,8 @@ Sight Witnesses::sight(drivers::Time now) const {
     if (sight.has_platform) sight.platform = platform_motion_.at(now_s);
     sight.table_stuck = sight.has_table && table_watch_.doubted();
     sight.platform_stuck = sight.has_platform && platform_watch_.doubted();
-    sight.table_g = std::max(sight.table.peak_g, sight.platform.peak_g / shown());
+    sight.by_platform_g = sight.platform.peak_g / shown();
+    sight.table_g = std::max(sight.table.peak_g, sight.by_platform_g);
     return sight;
 }
 

@@ -20,7 +20,8 @@ struct Sight {
     bool has_table = false, has_platform = false;
     Motion table, platform;
     bool table_stuck = false, platform_stuck = false;  ///< stillness of it is no rest
-    double table_g = 0;  ///< the largest peak at the table that any of them shows
+    double table_g = 0;        ///< the largest peak at the table that any of them shows
+    double by_platform_g = 0;  ///< the same by the platform's alone
 
     [[nodiscard]] bool known() const {
         return (table.known && !table_stuck) || (platform.known && !platform_stuck);

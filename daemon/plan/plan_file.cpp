@@ -242,16 +242,18 @@ void check_rig(const Json& plan, const std::vector<PlannedRun>& runs,
     const std::string place = path + ": plan";
     if (const auto dwell_s = number_at(plan, "dwell_s", place); dwell_s && !(*dwell_s > 0))
         refuse(place + ".dwell_s", number(*dwell_s), "more than 0 s");
+    // Runs with a frequency or a profile of their own have a transmission of their own, too.
+    const bool taken = std::ranges::any_of(runs, [](const PlannedRun& run) {
+        return run.profile.empty() && run.sweep_to_hz == 0 && run.frequency_hz == 0 &&
+               run.table_g > 0;
+    });
+    if (!taken) return;
     const auto stated = number_at(plan, "transmission", place);
     const auto own = transmission(std::nullopt);
     if (stated && own && apart(*stated, *own))
         refuse(place + ".transmission", number(*stated), "the configuration's, " + number(*own));
     const auto hz = number_at(plan, "frequency_hz", place);
-    const bool taken = std::ranges::any_of(runs, [](const PlannedRun& run) {
-        return run.profile.empty() && run.sweep_to_hz == 0 && run.frequency_hz == 0 &&
-               run.table_g > 0;
-    });
-    if (hz && rig_hz && taken && apart(*hz, *rig_hz))
+    if (hz && rig_hz && apart(*hz, *rig_hz))
         refuse(place + ".frequency_hz", number(*hz) + " Hz, and runs without one of their own",
                "the configuration's vibration.frequency_hz, " + number(*rig_hz) + " Hz");
 }

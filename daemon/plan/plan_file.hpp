@@ -36,12 +36,12 @@ struct PlannedRun {
 using TransmissionAt = std::function<std::optional<double>(std::optional<double> hz)>;
 
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; other
-/// keys that it writes are ignored, unknown ones refused), or CSV with the columns alpha_deg,
-/// beta_deg, gamma_deg, level_g or table_g, and count if not 1; and per run frequency_hz, and role
-/// "identify" or "verify", and `profile` with level_db in place of frequency and levels, which are
-/// empty or 0 in CSV then, or `sweep` {from_hz, to_hz, s} (CSV: sweep_from_hz, sweep_to_hz,
-/// sweep_s) in place of the frequency. Where one level is missing, `transmission` (platform over
-/// table) gives it; where both are there and disagree by more than 1
+/// keys are ignored, but for those that look like a misspelt one, which are refused), or CSV with
+/// the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count if not 1; and per run
+/// frequency_hz, and role "identify" or "verify", and `profile` with level_db in place of frequency
+/// and levels, which are empty or 0 in CSV then, or `sweep` {from_hz, to_hz, s} (CSV:
+/// sweep_from_hz, sweep_to_hz, sweep_s) in place of the frequency. Where one level is missing,
+/// `transmission` (platform over table) gives it; where both are there and disagree by more than 1
 /// %, the file is refused; so is JSON that states another transmission than the configuration's, or
 /// another frequency than `rig_hz` where runs shake at the configuration's. Throws PlanFileError.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -24,14 +25,17 @@ namespace {
 
 constexpr std::size_t kMostNamed = 12;
 
+// Together, or an index that was begun would be somebody else's.
 constexpr const char* kTables = R"(
+BEGIN;
 CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, name TEXT NOT NULL, started_by TEXT NOT NULL,
     started_utc_ns INTEGER NOT NULL, state TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS file (campaign TEXT NOT NULL, name TEXT NOT NULL, part INTEGER NOT NULL,
     closed INTEGER NOT NULL, from_utc_ns INTEGER NOT NULL, to_utc_ns INTEGER NOT NULL, rows INTEGER NOT NULL,
     bytes INTEGER NOT NULL, sha256 TEXT NOT NULL, PRIMARY KEY (campaign, name));
 CREATE INDEX IF NOT EXISTS campaign_by_name ON campaign (name);
-CREATE INDEX IF NOT EXISTS campaign_by_begin ON campaign (started_utc_ns))";
+CREATE INDEX IF NOT EXISTS campaign_by_begin ON campaign (started_utc_ns);
+COMMIT)";
 
 std::string base_name(const fs::path& path) {
     return (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -343,11 +347,11 @@ void compare_with_index(const std::string& campaign_folder, const Index::Tell& t
                              path.string(), fs::file_size(path, error), file.bytes));
         }
     }
-    for (const auto& words : missing_raw(campaign_folder, tell))
+    for (const auto& words : gone_raw(campaign_folder, tell))
         tell(campaign_folder + ": missing " + words);
 }
 
-std::vector<std::string> missing_raw(const std::string& campaign_folder, const Index::Tell& tell) {
+std::vector<std::string> gone_raw(const std::string& campaign_folder, const Index::Tell& tell) {
     std::map<int, std::string> expected;
     const auto there = raw_files(campaign_folder);
     for (int n = there.empty() ? 0 : raw_number(there.back()); n > 0; --n)
@@ -360,11 +364,22 @@ std::vector<std::string> missing_raw(const std::string& campaign_folder, const I
     for (const auto& path : there) expected.erase(raw_number(path));
     std::vector<std::string> words;
     for (auto& [number, text] : expected) words.push_back(std::move(text));
+    return words;
+}
+
+std::vector<std::string> cut_raw(const std::string& campaign_folder) {
+    std::vector<std::string> words;
     // A compressed one has its name once it is whole, also while the campaign is being written.
-    for (const auto& path : there) {
+    for (const auto& path : raw_files(campaign_folder)) {
         if (path.ends_with(".zst") && is_cut(path))
             words.push_back(fmt::format("the end of {}: the file is cut off", base_name(path)));
     }
+    return words;
+}
+
+std::vector<std::string> missing_raw(const std::string& campaign_folder, const Index::Tell& tell) {
+    auto words = gone_raw(campaign_folder, tell);
+    std::ranges::move(cut_raw(campaign_folder), std::back_inserter(words));
     return words;
 }
 

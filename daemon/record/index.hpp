@@ -89,6 +89,12 @@ class Index {
 void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell);
 /// In words, the segments of a campaign's raw log that are not in its folder: by the numbers of
 /// those that are, and by the index beside it. Empty: all are there.
+[[nodiscard]] std::vector<std::string> gone_raw(const std::string& campaign_folder,
+                                                const Index::Tell& tell);
+/// Likewise those that end within a frame. For whoever needs the log: its sizes are read, which
+/// takes a disk's time.
+[[nodiscard]] std::vector<std::string> cut_raw(const std::string& campaign_folder);
+/// Both.
 [[nodiscard]] std::vector<std::string> missing_raw(const std::string& campaign_folder,
                                                    const Index::Tell& tell);
 

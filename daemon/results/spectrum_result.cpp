@@ -148,11 +148,8 @@ double SpectrumResult::at_hz(std::size_t parameter) const {
     const std::size_t internal = estimator::internal_of(parameter);
     // Bias and linear terms know no frequency.
     const bool linear = internal / estimator::kGyros < estimator::kDii;
-    // Nor does a compromise between frequencies that differ belong to one of them.
-    const bool compromise = analysis.form == Form::flat && analysis.flat.alarm;
-    return linear || compromise || analysis.gyros[internal % estimator::kGyros].resonant()
-               ? 0
-               : reference_hz;
+    if (linear || analysis.gyros[internal % estimator::kGyros].resonant()) return 0;
+    return compromise ? std::numeric_limits<double>::quiet_NaN() : reference_hz;
 }
 
 bool SpectrumResult::same_at_all() const {
@@ -171,7 +168,8 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
     SpectralTable table(settings, std::move(dwells), std::move(kinds));
     Analysis analysis = analyse(settings, table, form, sweeps);
     const double hz = table.kinds().empty() ? 0 : table.kinds().front().hz();
-    return {std::move(analysis), std::move(table), hz, {}, std::move(sweeps)};
+    const bool compromise = form == Form::flat && analysis.flat.alarm;
+    return {std::move(analysis), std::move(table), hz, {}, std::move(sweeps), compromise};
 }
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
@@ -227,14 +225,9 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
               "over frequency nothing is freed: an error in what estimator.free names is in the "
               "coefficients",
               uncertainty::Level::not_valid);
-    if (of.flat.alarm && of.form != Form::resonance) {
-        const bool compromise = of.form == Form::flat;
-        doubt(assessed,
-              "quadratic coefficients depend on the frequency (p = " + std::to_string(of.flat.p) +
-                  " that they do not)" +
-                  (compromise ? ": one for all of them is that of none of them" : ""),
-              compromise ? uncertainty::Level::not_valid : uncertainty::Level::doubtful);
-    }
+    if (of.flat.alarm && of.form != Form::resonance)
+        doubt(assessed, "quadratic coefficients depend on the frequency (p = " +
+                            std::to_string(of.flat.p) + " that they do not)");
     if (!of.model.refusal.empty()) doubt(assessed, of.model.refusal);
 }
 

@@ -22,9 +22,11 @@ struct SpectrumResult {
     };
     std::vector<HeldOut> held_out = {};
     std::vector<estimator::spectrum::Sweep> sweeps = {};
+    /// Quadratic coefficients were asked to be the same at all frequencies, and are not.
+    bool compromise = false;
 
     /// Of one of the 30, order of parameter_names(): the frequency it is of, 0: static, or it knows
-    /// none; Hz.
+    /// none; NaN: a compromise belongs to none of them; Hz.
     [[nodiscard]] double at_hz(std::size_t parameter) const;
     /// Nothing says that the quadratic coefficients depend on the frequency.
     [[nodiscard]] bool same_at_all() const;

@@ -14,7 +14,7 @@ namespace vibrig::estimator {
 struct RunAmplitude {
     int run = 0;
     double amplitude_g = 0, kappa = 1, sigma_g = 0;
-    double frequency_hz = 0;  ///< 0: at rest, or not found near the nominal one
+    double frequency_hz = 0;  ///< 0: at rest, random, or no line near the nominal one
 
     [[nodiscard]] bool at_rest() const noexcept;
 };

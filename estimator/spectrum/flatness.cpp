@@ -101,19 +101,19 @@ MatrixXd covariance_if_flat(const uncertainty::GyroRates& gyro,
     uncertainty::GyroRates flat = gyro;
     flat.regressors = base;
     flat.prior_information = prior_sigma.array().square().inverse();
-    double scatter = 0;
+    const double unit = uncertainty::unit_of(gyro.variance);
+    double scatter = 0;  // of the rates' variance
     for (const auto& [what, weight] : of_groups.likeliest)
-        scatter += weight * what.scatter * what.scatter;
+        scatter += weight * std::pow(what.scatter * unit, 2);
     const Index n = gyro.dwells();
-    const MatrixXd unit = MatrixXd::Identity(n, n);
+    const MatrixXd one_each = MatrixXd::Identity(n, n);
     MatrixXd precision = MatrixXd::Zero(n, n);
     double all = 0;
     // Of the inverses: a change that is large, but hardly likely, does not hide the frequencies.
     for (const auto& one : slow_part(uncertainty::average_drift(flat, drift))) {
         uncertainty::DriftAverage alone;
         alone.likeliest = {{one.first, 1.0}};
-        const MatrixXd covariance =
-            uncertainty::mean_covariance(flat, alone) + scatter * gyro.variance.mean() * unit;
+        const MatrixXd covariance = uncertainty::mean_covariance(flat, alone) + scatter * one_each;
         precision += one.second * linear_algebra::positive_inverse(covariance);
         all += one.second;
     }

@@ -5,16 +5,25 @@
 namespace vibrig::estimator::uncertainty {
 namespace {
 
-/// Dwells after which each run of a plain order ends. An order that returns to a run mixes the
-/// levels, and nobody switches the gyros off at each change of level.
+/// Dwells after which each run of a plain order ends. An order that goes back to former runs mixes
+/// the levels, and nobody switches the gyros off at each change of level; a repeat or two of a
+/// former run's dwells makes no mixed order.
 std::vector<std::size_t> ends_of_runs(const DwellTable& table) {
+    constexpr std::size_t kRepeats = 8;  // one of so many
     std::vector<std::size_t> ends;
     std::set<int> begun;
+    std::size_t back = 0;
+    int newest = 0;
     for (std::size_t k = 0; k < table.rows.size(); ++k) {
-        if (k > 0 && table.rows[k].run == table.rows[k - 1].run) continue;
-        if (!begun.insert(table.rows[k].run).second) return {};
-        if (k > 0) ends.push_back(k);
+        const int run = table.rows[k].run;
+        if (begun.insert(run).second) {
+            if (k > 0) ends.push_back(k);
+            newest = run;
+        } else if (run != newest) {
+            ++back;
+        }
     }
+    if (kRepeats * back > table.rows.size()) return {};
     return ends;
 }
 

@@ -114,10 +114,6 @@ std::vector<Weighted> hypotheses(const GyroRates& gyro, const Drift& drift, doub
     return list;
 }
 
-/// The noise that the rates are known to, deg/h, in which sizes are counted: of equal dwells that
-/// of each. A dwell that was cut short knows next to nothing and must not set it for the others.
-double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseInverse().mean()); }
-
 /// What the covariances of all hypotheses are made of.
 struct Kernels {
     explicit Kernels(const GyroRates& gyro)
@@ -288,6 +284,8 @@ DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
 }
 
 }  // namespace
+
+double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseInverse().mean()); }
 
 DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     const Kernels kernels(gyro);

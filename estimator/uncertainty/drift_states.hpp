@@ -58,6 +58,10 @@ struct DriftAverage {
     std::vector<std::pair<DriftHypothesis, double>> likeliest;  ///< with their weights
 };
 
+/// The unit of a drift's sizes, from the variances of a gyro's rates: what equal dwells are known
+/// to, deg/h. One that was cut short knows next to nothing and does not set it for the others.
+[[nodiscard]] double unit_of(const Eigen::VectorXd& variance);
+
 [[nodiscard]] DriftAverage average_drift(const GyroRates& gyro, const Drift& drift);
 
 /// Covariance of the rates about their model, n x n: noise, and what the bias may have done by

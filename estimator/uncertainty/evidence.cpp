@@ -155,8 +155,7 @@ std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit
                                      const RampFit& ramps, const ForwardModel& model,
                                      const std::array<GyroRates, 3>& gyros) {
     double variance = 0;
-    // As the drift's own unit: a dwell that was cut short sets none.
-    for (const GyroRates& gyro : gyros) variance += 1 / gyro.variance.cwiseInverse().mean() / 3.0;
+    for (const GyroRates& gyro : gyros) variance += std::pow(unit_of(gyro.variance), 2) / 3.0;
     const double s0 = std::sqrt(variance);
     std::vector<Evidence> all;
     constexpr std::array kOne{

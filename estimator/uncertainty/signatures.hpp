@@ -36,7 +36,7 @@ struct Signatures {
                                         const std::function<void(Disturbance&, double)>& set,
                                         double step);
 
-/// `after_dwell`: place of a step; `s0`: root of the mean variance of a dwell.
+/// `after_dwell`: place of a step; `s0`: unit of a drift's sizes, unit_of().
 [[nodiscard]] Signatures signatures(Misfit misfit, const DwellTable& table,
                                     const ForwardModel& model, double s0, int after_dwell = 0);
 

@@ -28,8 +28,8 @@ WARM = ("--warm-up", "0", "--start-temperature", "45", "--seed", "5")
 NO_WATCHDOG = ("--fault", "timeout-ignored")
 # Nothing here is about how soon: the machine may be busy. How soon is said by the unit tests, on the guard's own clock.
 SOON = 30
-DAEMON_WORD, GUARD_WORD = "<IIQ4QdQ", "<IHHQQd"
-DAEMON_KIND, GUARD_KIND = 0x31446256, 0x31476256
+DAEMON_WORD, GUARD_WORD = "<IIQ4QdQd", "<IHHQQd"
+DAEMON_KIND, GUARD_KIND = 0x32446256, 0x31476256
 CAUSES = ["none", "daemon_silent", "daemon_hangs", "unarmed_motion", "over_level", "stop_disobeyed"]
 
 
@@ -314,7 +314,7 @@ class Liar:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))
         while not self.quit.wait(0.1):
             self.sequence += 1
-            self.link.send(struct.pack(DAEMON_WORD, DAEMON_KIND, self.flags, self.sequence, *[self.sequence] * 4, self.level_g, 0))
+            self.link.send(struct.pack(DAEMON_WORD, DAEMON_KIND, self.flags, self.sequence, *[self.sequence] * 4, self.level_g, 0, 1.0))
             self.link.settimeout(1)
             try:
                 self.heard = struct.unpack(GUARD_WORD, self.link.recv(100))

@@ -2,15 +2,14 @@
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 #include "daemon/allan/analysis.hpp"
 #include "daemon/results/text_line.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -83,10 +82,7 @@ bool allan_live(const AllanRequest& request, bool json, const std::string& page)
     shown.to_deg_h = to_deg_h;
     shown.factors = dynamic.factors();
     // A place that cannot be written is found now, not when the first window is full.
-    if (!page.empty()) {
-        plot::write_file(page + ".new", "");
-        std::filesystem::remove(page + ".new");
-    }
+    if (!page.empty()) proto::OutputFile{page};
     bool alarmed = false, written = true;
     auto next_page = std::chrono::steady_clock::now();
     std::size_t number = 0;

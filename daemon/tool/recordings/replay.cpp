@@ -164,8 +164,12 @@ int replay(const ReplayArguments& arguments) {
     const auto& files = arguments.files;
     bool whole = true;
     if (std::ranges::none_of(files, is_log)) {
-        // Named when the campaign was read.
-        whole = record::missing_raw(campaign.folder, [](const auto&) {}).empty();
+        // What is gone was named when the campaign was read.
+        whole = record::gone_raw(campaign.folder, [](const auto&) {}).empty();
+        for (const auto& words : record::cut_raw(campaign.folder)) {
+            std::cerr << campaign.folder << ": missing " << words << '\n';
+            whole = false;
+        }
     } else if (std::ranges::all_of(files, record::raw_number)) {
         const std::string folder = record::folder_of(files.front());
         whole = tell_missing_raw(folder);

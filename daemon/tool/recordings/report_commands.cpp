@@ -314,7 +314,9 @@ std::string about_frequencies(const std::string& path, const Assessed& of, doubl
     for (std::size_t j = 0; j < 3; ++j) {
         const double hz = of.spectrum->at_hz(estimator::kGroups * j + 4);  // D_II, as the others
         text += printed("%s gyro %c ", j == 0 ? "" : ",", "xyz"[j]) +
-                (hz > 0 ? printed("at %g Hz", hz) : std::string("static"));
+                (hz > 0           ? printed("at %g Hz", hz)
+                 : std::isnan(hz) ? std::string("of no frequency, a compromise")
+                                  : std::string("static"));
     }
     return text;
 }

@@ -43,6 +43,14 @@ TEST(GuardWords, ALevelThatIsNoLevelIsRefused) {
     }
 }
 
+TEST(GuardWords, ARatioThatIsNoneIsRefused) {
+    for (const double ratio : {0.5, -1.0, 1001.0, std::numeric_limits<double>::quiet_NaN()}) {
+        DaemonWord daemon;
+        daemon.platform_ratio = ratio;
+        EXPECT_FALSE(decode_daemon_word(encode(daemon))) << ratio;
+    }
+}
+
 TEST(GuardWords, FlagsAndCausesThatDoNotExistAreRefused) {
     auto daemon = encode(DaemonWord{});
     daemon[4] = 8;

@@ -315,6 +315,9 @@ TEST_F(Recording, RefusesADwellThatIsThereTwice) {
               "expected each dwell once");
     // Other noise at the same times is another dwell.
     EXPECT_EQ(read(two + dwell(1, 0.11, 100)).size(), 300U);
+    // Of instruments too coarse for their noise one dwell is like another, whatever was measured.
+    const std::string coarse = dwell(1, 0, 100);
+    EXPECT_EQ(read(kHeader + coarse + dwell(2, 0.2, 100) + coarse).size(), 300U);
 }
 
 TEST_F(Recording, ReadsOtherSeparatorsAndDecimalCommasWhereTheyAreUnambiguous) {

@@ -26,7 +26,7 @@ class World {
     void shake(double table_g) {
         e.sight.table = {true, 0.001 + table_g / 1.5, 0.001 + table_g};
         e.sight.platform = {true, 0.001 + table_g / 2.5, 0.001 + table_g * 0.6667};
-        e.sight.table_g = table_g;
+        e.sight.table_g = e.sight.by_platform_g = table_g;
     }
     void blind() { e.sight.table.known = e.sight.platform.known = false; }
     /// Goes on for so long; when a cause first appeared in it, s; -1: it did not.
@@ -103,6 +103,24 @@ TEST(Judge, ADaemonThatFallsSilentWhileTheTableMovesIsFoundWithinItsDeadline) {
     EXPECT_EQ(world.judge.cause(), GuardCause::daemon_silent);
     EXPECT_TRUE(world.judge.stop_wanted());
     EXPECT_EQ(world.judge.tune(), Tune::stop);
+}
+
+TEST(Judge, ThePlatformMayShowMoreOfAPlansOtherVibrationTheTableMayNot) {
+    World world;
+    world.arm(9);
+    world.e.word->platform_ratio = 2;
+    world.shake(9);
+    world.e.sight.by_platform_g = 17;  // it lets through twice what it does at the reference
+    EXPECT_EQ(world.pass(5), -1);
+    world.e.sight.by_platform_g = 9 * 2 * 1.2;  // 1 dB are 12 %
+    EXPECT_GE(world.pass(5), 0);
+    EXPECT_EQ(world.judge.cause(), GuardCause::over_level);
+    World table;
+    table.arm(9);
+    table.e.word->platform_ratio = 2;
+    table.shake(9 * 1.2);
+    table.e.sight.by_platform_g = 9;
+    EXPECT_GE(table.pass(5), 0) << "by the table itself";
 }
 
 TEST(Judge, RestOfBeforeDoesNotForgetAnArming) {

@@ -173,8 +173,21 @@ TEST(Declared, APredictionHasTheCorrelationAndTheSameAccelerometersTakeTheirGain
                           pair = predict(with.model, in).covariance -
                                  predict(without.model, in).covariance;
     ASSERT_GT(gain.diagonal().minCoeff(), 0);
+    // The signs: what the drift does when the coefficients move as the input has it.
+    const auto moved = [&](const std::string& input) {
+        Model model = without.model;
+        for (const Effect& one : model.effects) {
+            if (one.input != input) continue;
+            for (std::size_t j = 0; j < 3; ++j)
+                model.mixture[j].front().x.head(one.change[j].size()) += one.change[j];
+        }
+        const Eigen::MatrixXd change = predict(model, in).drift - predict(without.model, in).drift;
+        return Eigen::VectorXd(change.transpose().reshaped());  // element 3 k + j
+    };
+    const Eigen::VectorXd both = moved("accelerometer_gain").cwiseProduct(moved("latitude"));
     for (Eigen::Index i = 0; i < pair.rows(); ++i)
-        EXPECT_NEAR(std::abs(pair(i, i)), 2 * r * std::sqrt(gain(i, i) * latitude(i, i)),
+        EXPECT_NEAR(pair(i, i),
+                    std::copysign(2 * r * std::sqrt(gain(i, i) * latitude(i, i)), both[i]),
                     1e-9 * gain(i, i) + 1e-16);
     // The gain goes, with what it has in common with others; the latitude stays.
     const PredictionOptions same{1, true};

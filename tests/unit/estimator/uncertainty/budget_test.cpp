@@ -184,12 +184,13 @@ TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
 
 TEST(Budget, AStepBetweenRunsIsDeclaredWhereThePowerMayHaveBeenCutOnly) {
     const auto elements = [](const std::vector<estimator::testing::PlannedRow>& plan, Power power,
-                             std::size_t lost = 0) {
+                             std::size_t lost = 0, std::size_t repeat = 0) {
         Settings settings;
         settings.drift.power = power;
         settings.uncertainty.bias_step_between_runs.u = 0.1;
         auto rows = theory_rows(settings, plan);
         if (lost > 0) rows[lost].after_power_loss = true;
+        if (repeat > 0) rows[repeat].run = rows.front().run;
         std::vector<std::string> found;
         for (const InputSignature& input : assess(settings, result_of(rows)).inputs)
             if (input.input == "bias_step_between_runs") found.push_back(input.element);
@@ -203,6 +204,7 @@ TEST(Budget, AStepBetweenRunsIsDeclaredWhereThePowerMayHaveBeenCutOnly) {
     EXPECT_EQ(elements(plain, Power::per_run), half_way);
     EXPECT_EQ(elements(plain, Power::unknown), half_way);
     EXPECT_EQ(elements(plain, Power::unbroken), none);
+    EXPECT_EQ(elements(plain, Power::per_run, 0, 20), half_way) << "a repeat mixes no order";
     // Nobody switches the gyros off at each change of level of a mixed order.
     EXPECT_EQ(elements(mixed, Power::per_run), none);
     EXPECT_EQ(elements(mixed, Power::unknown), none);
