@@ -98,6 +98,9 @@ CommandReply Campaign::acknowledge(const CommandRequest& request, Time now) {
 
 std::string Campaign::not_fit_to_excite(Time now) const {
     if (auto why = ports_.rig.unfit(); !why.empty()) return why;
+    if (writes_held_)
+        return "nothing but a stop is written to the controller: its registers had not been tried "
+               "when vibrigd started; start it again once they were";
     const auto reading = ports_.rig.shaker.reading();
     if (ports_.rig.shaker.stop_pending()) return "a stop of the shaker is pending";
     if (stop_.stopping()) {

@@ -378,6 +378,10 @@ def with_swapped_words(checks, u):
         checks.check('shaker.registers.amplitude.word_order is "big", was "little" when it was tried' in unwrapped(early),
                      "registers that are others than those that were tried are not tried", early)
         u.registers_are_tried()
+        # The running daemon has written nothing to them, and goes on so: they are tried with vibrigd stopped.
+        held = tried_first(rig, "units")
+        checks.check("its registers had not been tried when vibrigd started" in unwrapped(held), "nor are those that are said to be tried while it runs", held)
+        u.registers_were_tried()
         refused = in_background(rig, "units")
         checks.check(press(rig, "rack") and press(rig, "door"), "each button comes before it shakes, whatever was asked for", refused.text())
         ended(refused)
