@@ -8,6 +8,7 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "daemon/serve/tls.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig {
 
@@ -138,6 +140,7 @@ void check_certificates(const configuration::Loaded& loaded) {
 }
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {
+    constexpr double kSameDwell = 1e-9;
     const campaign::Settings& campaign = configuration.campaign;
     std::vector<std::string> warnings;
     const auto& rig = configuration.estimator;
@@ -146,6 +149,12 @@ std::vector<std::string> check_plan(const configuration::Configuration& configur
         warnings.emplace_back(
             "positions of lists and plans are gimbal angles, converted by platform.encoder_sign "
             "and encoder_zero_deg: a file that states what the encoders show is to be mended");
+    if (const double planned_s = campaign.planned_dwell_s;
+        planned_s > 0 && std::abs(planned_s - campaign.dwell_s) > kSameDwell * campaign.dwell_s)
+        warnings.push_back(
+            fmt::format("campaign.plan: {} was made for dwells of {:g} s, and campaign.dwell_s is "
+                        "{:g} s: what it forecasts is not what this campaign will reach",
+                        proto::printable(campaign.plan), planned_s, campaign.dwell_s));
     // Of a plan file and of an adaptive campaign the forecast tells.
     if (!campaign.stops.empty() || campaign.adaptive) return warnings;
     for (auto& line : estimator::plan_warnings(

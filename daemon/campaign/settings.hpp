@@ -141,9 +141,10 @@ struct Settings {
     VisitOrder order = VisitOrder::balanced;
     /// The order itself: places in the list of levels, each with all positions; empty: that list.
     std::vector<std::size_t> sequence;
-    std::string plan;          ///< plan file; empty: every position at every level
-    std::vector<Stop> stops;   ///< of the plan file, in its order
-    bool identify_all = true;  ///< refuse a campaign that cannot determine all 30 coefficients
+    std::string plan;            ///< plan file; empty: every position at every level
+    double planned_dwell_s = 0;  ///< that the plan file was made for; 0: it states none
+    std::vector<Stop> stops;     ///< of the plan file, in its order
+    bool identify_all = true;    ///< refuse a campaign that cannot determine all 30 coefficients
     // Adaptive: chosen dwell by dwell until the standard errors are down to the targets (0: any).
     bool adaptive = false;
     double target_bias = 0;       ///< deg/h

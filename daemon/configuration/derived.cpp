@@ -60,8 +60,9 @@ void take_plan(Configuration& c) {
     const auto transmission = [&c](std::optional<double> hz) {
         return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
     };
-    for (const auto& run :
-         plan::read_plan(c.campaign.plan, transmission, c.estimator.frequency_hz)) {
+    const auto plan = plan::read_plan_file(c.campaign.plan, transmission, c.estimator.frequency_hz);
+    c.campaign.planned_dwell_s = plan.dwell_s.value_or(0);
+    for (const auto& run : plan.runs) {
         if (!run.profile.empty()) {
             c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run));
             continue;

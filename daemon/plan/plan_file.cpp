@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -25,19 +24,29 @@ constexpr double kAtRestG = 1e-9;
 
 std::string number(double value) { return Json(value).dump(); }
 
+/// What a run does not have of its own, and of which no name is a misspelt one.
+constexpr std::array<std::string_view, 3> kOfTheCampaign{"dwell_s", "settle_s", "ramp_s"};
+
+/// Throws where `key` is not among `known` and is meant to be one, or to be the run's own.
+void refuse_key(std::string_view key, const std::vector<std::string_view>& known,
+                const std::string& place, bool run) {
+    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
+    if (key.size() > kLongest || std::ranges::find(known, key) != known.end()) return;
+    if (run && std::ranges::find(kOfTheCampaign, key) != kOfTheCampaign.end())
+        refuse(place, "one of a run",
+               "none: it is campaign." + std::string(key) + " of the configuration for all");
+    for (const std::string_view name : known) {
+        if (proto::edits(key, name) * kLettersPerEdit <= key.size())
+            refuse(place, "an unknown key", "a known one, perhaps " + std::string(name));
+    }
+}
+
 /// A misspelt key would leave the rig to its configuration without a word. What resembles none, a
 /// remark of somebody's, may stand there.
-void refuse_unknown(const Json& object, std::initializer_list<std::string_view> known,
-                    const std::string& place) {
-    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
-    for (const auto& [key, value] : object.items()) {
-        if (key.size() > kLongest || std::ranges::find(known, key) != known.end()) continue;
-        for (const std::string_view name : known) {
-            if (proto::edits(key, name) * kLettersPerEdit <= key.size())
-                refuse(place + "." + proto::printable(key), "an unknown key",
-                       "a known one, perhaps " + std::string(name));
-        }
-    }
+void refuse_unknown(const Json& object, const std::vector<std::string_view>& known,
+                    const std::string& place, bool run = false) {
+    for (const auto& [key, value] : object.items())
+        refuse_key(key, known, place + "." + proto::printable(key), run);
 }
 
 void check_position(const std::array<double, 3>& position, const std::string& place) {
@@ -169,7 +178,7 @@ PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
     refuse_unknown(json,
                    {"position", "level_g", "table_g", "count", "frequency_hz", "sweep", "profile",
                     "level_db", "role"},
-                   place);
+                   place, true);
     PlannedRun run;
     const auto position = json.find("position");
     if (position == json.end() || !position->is_array() || position->size() != 3 ||
@@ -240,8 +249,6 @@ void check_rig(const Json& plan, const std::vector<PlannedRun>& runs,
                const std::string& path) {
     const auto apart = [](double a, double b) { return !(std::abs(a - b) <= kAgreement * b); };
     const std::string place = path + ": plan";
-    if (const auto dwell_s = number_at(plan, "dwell_s", place); dwell_s && !(*dwell_s > 0))
-        refuse(place + ".dwell_s", number(*dwell_s), "more than 0 s");
     // Runs with a frequency or a profile of their own have a transmission of their own, too.
     const bool taken = std::ranges::any_of(runs, [](const PlannedRun& run) {
         return run.profile.empty() && run.sweep_to_hz == 0 && run.frequency_hz == 0 &&
@@ -258,9 +265,8 @@ void check_rig(const Json& plan, const std::vector<PlannedRun>& runs,
                "the configuration's vibration.frequency_hz, " + number(*rig_hz) + " Hz");
 }
 
-std::vector<PlannedRun> runs_from_json(const std::string& text, const std::string& path,
-                                       const TransmissionAt& transmission,
-                                       std::optional<double> rig_hz) {
+PlanFile runs_from_json(const std::string& text, const std::string& path,
+                        const TransmissionAt& transmission, std::optional<double> rig_hz) {
     Json json;
     try {
         json = Json::parse(text);
@@ -274,12 +280,14 @@ std::vector<PlannedRun> runs_from_json(const std::string& text, const std::strin
     const auto runs = json.find("runs");
     if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");
     check_keys(json, path);
-    std::vector<PlannedRun> result;
+    PlanFile result{{}, number_at(json, "dwell_s", path + ": plan")};
+    if (result.dwell_s && !(*result.dwell_s > 0))
+        refuse(path + ": plan.dwell_s", number(*result.dwell_s), "more than 0 s");
     for (const Json& run : *runs) {
-        result.push_back(
-            from_json(run, transmission, path + ": runs[" + std::to_string(result.size()) + "]"));
+        result.runs.push_back(from_json(
+            run, transmission, path + ": runs[" + std::to_string(result.runs.size()) + "]"));
     }
-    check_rig(json, result, transmission, rig_hz, path);
+    check_rig(json, result.runs, transmission, rig_hz, path);
     return result;
 }
 
@@ -386,11 +394,16 @@ PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_de
 std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
                                       const TransmissionAt& transmission) {
     // Which of the levels a row needs depends on whether it has a profile.
-    const NumberTable table = read_table(text, path,
-                                         {{"alpha_deg", "beta_deg", "gamma_deg", "count"},
-                                          {"level_g", "table_g", "frequency_hz", "level_db",
-                                           "sweep_from_hz", "sweep_to_hz", "sweep_s"},
-                                          {"profile", "role"}});
+    const TableForm form{{"alpha_deg", "beta_deg", "gamma_deg", "count"},
+                         {"level_g", "table_g", "frequency_hz", "level_db", "sweep_from_hz",
+                          "sweep_to_hz", "sweep_s"},
+                         {"profile", "role"}};
+    const NumberTable table = read_table(text, path, form);
+    std::vector<std::string_view> known = form.numbers;
+    known.insert(known.end(), form.maybe_numbers.begin(), form.maybe_numbers.end());
+    known.insert(known.end(), form.words.begin(), form.words.end());
+    for (const std::string& name : table.names)
+        refuse_key(name, known, path + ":1: column " + proto::printable(name), true);
     const auto positions = positions_of(table, path);
     std::vector<PlannedRun> result;
     for (std::size_t i = 0; i < positions.size(); ++i)
@@ -419,19 +432,24 @@ std::vector<PlannedRun> read_plan(const std::string& path, double transmission) 
     return runs;
 }
 
-std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission,
-                                  std::optional<double> rig_hz) {
+PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmission,
+                        std::optional<double> rig_hz) {
     const std::string text = content_of(path);
     const std::size_t first = text.find_first_not_of(" \t\r\n");
-    auto runs = first != std::string::npos && text[first] == '{'
-                    ? runs_from_json(text, path, transmission, rig_hz)
-                    : runs_from_csv(text, path, transmission);
+    PlanFile plan = first != std::string::npos && text[first] == '{'
+                        ? runs_from_json(text, path, transmission, rig_hz)
+                        : PlanFile{runs_from_csv(text, path, transmission), {}};
     std::size_t sum = 0;
-    for (const PlannedRun& run : runs) sum += run.count;
-    if (runs.empty() || sum > kMostRuns) {
+    for (const PlannedRun& run : plan.runs) sum += run.count;
+    if (plan.runs.empty() || sum > kMostRuns) {
         refuse(path, std::to_string(sum) + " runs", "1 to " + std::to_string(kMostRuns));
     }
-    return runs;
+    return plan;
+}
+
+std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission,
+                                  std::optional<double> rig_hz) {
+    return read_plan_file(path, transmission, rig_hz).runs;
 }
 
 std::vector<std::array<double, 3>> read_positions(const std::string& path) {

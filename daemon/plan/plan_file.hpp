@@ -35,8 +35,14 @@ struct PlannedRun {
 /// Platform over table; of a frequency, or, for none, of the configuration's. None: not known.
 using TransmissionAt = std::function<std::optional<double>(std::optional<double> hz)>;
 
+struct PlanFile {
+    std::vector<PlannedRun> runs;
+    std::optional<double> dwell_s;  ///< that its forecast was made for; a run has none of its own
+};
+
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; other
-/// keys are ignored, but for those that look like a misspelt one, which are refused), or CSV with
+/// keys and columns are ignored, but for those that look like a misspelt one or are the campaign's,
+/// dwell_s, settle_s and ramp_s of a run: these are refused), or CSV with
 /// the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count if not 1; and per run
 /// frequency_hz, and role "identify" or "verify", and `profile` with level_db in place of frequency
 /// and levels, which are empty or 0 in CSV then, or `sweep` {from_hz, to_hz, s} (CSV:
@@ -44,6 +50,9 @@ using TransmissionAt = std::function<std::optional<double>(std::optional<double>
 /// `transmission` (platform over table) gives it; where both are there and disagree by more than 1
 /// %, the file is refused; so is JSON that states another transmission than the configuration's, or
 /// another frequency than `rig_hz` where runs shake at the configuration's. Throws PlanFileError.
+[[nodiscard]] PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmission,
+                                      std::optional<double> rig_hz = std::nullopt);
+/// The runs alone.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
                                                 const TransmissionAt& transmission,
                                                 std::optional<double> rig_hz = std::nullopt);

@@ -30,10 +30,12 @@ StageFeed::Mode mode_of(std::uint32_t order) noexcept {
 }  // namespace
 
 StageFeed::Layout StageFeed::bind(const proto::Dbc& dbc, const char* key,
-                                  const std::string& message) {
+                                  const std::string& message, const char* unit) {
     Layout layout;
     const auto signal = [&](const char* name) {
         const auto bound = drivers::bind_signal(dbc, key, message + "." + name);
+        drivers::expect_unit(bound, key, message + "." + name,
+                             std::string_view(name) == "Counter" ? "" : unit);
         layout.message = bound.message;
         return bound.signal;
     };
@@ -48,9 +50,9 @@ StageFeed::StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings,
     if (settings_.block == 0)
         throw std::invalid_argument("stage feed: block: found 0 samples, expected 1 at least");
     if (settings_.increments) {
-        gyro_ = bind(dbc, "zeroing.gyro_message", settings_.gyro_message);
+        gyro_ = bind(dbc, "zeroing.gyro_message", settings_.gyro_message, "arcsec");
         accelerometer_ =
-            bind(dbc, "zeroing.accelerometer_message", settings_.accelerometer_message);
+            bind(dbc, "zeroing.accelerometer_message", settings_.accelerometer_message, "m/s");
     }
     if (const auto* message = dbc.find(std::string_view(settings_.status_message))) {
         status_ = message;
@@ -65,6 +67,7 @@ StageFeed::StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings,
                                             ", or neither: the base's velocity has two components");
         }
         velocity_[i] = drivers::bind_signal(dbc, kVelocity[i], settings_.velocity[i]);
+        drivers::expect_unit(velocity_[i], kVelocity[i], settings_.velocity[i], "m/s");
     }
     if (velocity_[0] && velocity_[0].signal == velocity_[1].signal)
         throw drivers::BindingError(kVelocity[1], settings_.velocity[1],

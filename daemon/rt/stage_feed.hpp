@@ -87,7 +87,7 @@ class StageFeed {
         const proto::Signal* counter = nullptr;
     };
     [[nodiscard]] static Layout bind(const proto::Dbc& dbc, const char* key,
-                                     const std::string& message);
+                                     const std::string& message, const char* unit);
     void pair(const Layout& layout, const canfd_frame& frame, drivers::Time arrived) noexcept;
     void begin(std::uint32_t order) noexcept;
     void take_velocity(const drivers::ReceivedFrame& received) noexcept;

@@ -21,12 +21,14 @@ const char* name_of(GimbalState state) noexcept {
 Gimbal::Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port)
     : message_(nullptr), settings_(settings), port_(port) {
     const std::string key = "can.signals.gimbal_command";
-    const auto bind = [&](const char* signal) {
-        const BoundSignal bound = bind_signal(dbc, key, settings_.message + "." + signal);
+    const auto bind = [&](const char* signal, const char* unit = "") {
+        const std::string name = settings_.message + "." + signal;
+        const BoundSignal bound = bind_signal(dbc, key, name);
+        expect_unit(bound, key, name, unit);
         message_ = bound.message;
         return bound.signal;
     };
-    angles_ = {bind("Outer"), bind("Inner"), bind("Azimuth")};
+    angles_ = {bind("Outer", "deg"), bind("Inner", "deg"), bind("Azimuth", "deg")};
     mode_signal_ = bind("Mode");
     counter_signal_ = bind("Counter");
 }

@@ -12,13 +12,14 @@ namespace vibrig::drivers {
 
 Torquer::Torquer(const proto::Dbc& dbc, const TorquerSettings& settings, CanPort& port)
     : settings_(settings), port_(port) {
-    const auto bind = [&](const char* signal) {
-        const BoundSignal bound =
-            bind_signal(dbc, "levelling.torque_message", settings_.message + "." + signal);
+    const auto bind = [&](const char* signal, const char* unit = "") {
+        const std::string name = settings_.message + "." + signal;
+        const BoundSignal bound = bind_signal(dbc, "levelling.torque_message", name);
+        expect_unit(bound, "levelling.torque_message", name, unit);
         message_ = bound.message;
         return bound.signal;
     };
-    rates_ = {bind("X"), bind("Y"), bind("Z")};
+    rates_ = {bind("X", "deg/h"), bind("Y", "deg/h"), bind("Z", "deg/h")};
     counter_signal_ = bind("Counter");
     limit_ = HUGE_VAL;
     for (const proto::Signal* rate : rates_) {

@@ -72,6 +72,7 @@ struct StatusRow {
     bool PlatformStatus::*flag = nullptr;  ///< that is set unless the value is 0
     bool of_gimbals = false;
     std::optional<std::size_t> sensor = {};  ///< place in kTemperatureSensors
+    const char* unit = "";
 };
 
 inline constexpr std::array kStatusTable{
@@ -81,7 +82,13 @@ inline constexpr std::array kStatusTable{
               &PlatformStatus::gyros_at_speed},
     StatusRow{"ready", &SignalBindings::ready, "1: platform ready", &PlatformStatus::ready},
     StatusRow{"fault", &SignalBindings::fault, "1: platform fault", &PlatformStatus::fault},
-    StatusRow{"temperature", &SignalBindings::temperature, "platform temperature, degC"},
+    StatusRow{"temperature",
+              &SignalBindings::temperature,
+              "platform temperature, degC",
+              nullptr,
+              false,
+              {},
+              "degC"},
     StatusRow{"in_position", &SignalBindings::in_position, "1: gimbals in position",
               &PlatformStatus::in_position, true},
     StatusRow{"slewing", &SignalBindings::slewing, "1: gimbals slewing", &PlatformStatus::slewing,
@@ -89,12 +96,12 @@ inline constexpr std::array kStatusTable{
     StatusRow{"command_echo", &SignalBindings::command_echo,
               "counter of the last gimbal command accepted", nullptr, true},
     StatusRow{"temperature_case", &SignalBindings::temperature_case,
-              "degC; the default may be missing in the DBC", nullptr, false, 0},
+              "degC; the default may be missing in the DBC", nullptr, false, 0, "degC"},
     StatusRow{"temperature_gyro_x", &SignalBindings::temperature_gyro_x,
-              "degC; as temperature_case", nullptr, false, 1},
+              "degC; as temperature_case", nullptr, false, 1, "degC"},
     StatusRow{"temperature_gyro_y", &SignalBindings::temperature_gyro_y,
-              "degC; as temperature_case", nullptr, false, 2},
+              "degC; as temperature_case", nullptr, false, 2, "degC"},
     StatusRow{"temperature_gyro_z", &SignalBindings::temperature_gyro_z,
-              "degC; as temperature_case", nullptr, false, 3}};
+              "degC; as temperature_case", nullptr, false, 3, "degC"}};
 
 }  // namespace vibrig::drivers

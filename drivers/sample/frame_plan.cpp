@@ -24,9 +24,13 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
     : dbc_(dbc) {
     // Another lab's DBC names most things otherwise: all that is missing is listed at once.
     std::vector<BindingError> missing;
-    const auto bind = [this, &missing](const char* key, const std::string& name) -> BoundSignal {
+    const auto bind = [this, &missing](const char* key, const std::string& name,
+                                       const char* unit = "") -> BoundSignal {
+        const std::string place = std::string("can.signals.") + key;
         try {
-            return bind_signal(dbc_, std::string("can.signals.") + key, name);
+            const BoundSignal bound = bind_signal(dbc_, place, name);
+            expect_unit(bound, place, name, unit);
+            return bound;
         } catch (const BindingError& error) {
             missing.push_back(error);
             return {};
@@ -41,7 +45,7 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
     const std::string none;
     for (const ChannelRow& c : kChannelTable) {
         const auto index = static_cast<std::size_t>(c.channel);
-        const BoundSignal value = bind(c.name, names.*c.signal);
+        const BoundSignal value = bind(c.name, names.*c.signal, c.unit);
         const BoundSignal valid =
             c.valid == nullptr ? BoundSignal{}
                                : bind((c.name + std::string("_valid")).c_str(), names.*c.valid);
@@ -51,7 +55,8 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
         const auto add = [&](const std::string& key, const std::string& name, bool validity) {
             for (std::uint32_t part = 0; part < samples_per_frame; ++part) {
                 const BoundSignal of_part =
-                    bind(key.c_str(), part == 0 ? name : name + '_' + std::to_string(part));
+                    bind(key.c_str(), part == 0 ? name : name + '_' + std::to_string(part),
+                         validity ? "" : c.unit);
                 if (of_part)
                     plan_for(*of_part.message)
                         .channels.push_back({index, of_part.signal, validity, part});
@@ -80,7 +85,7 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
     for (const StatusRow& row : kStatusTable) {
         const std::string& name = names.*row.signal;
         if (const BoundSignal bound =
-                bind(row.name, row.sensor ? if_there(name, usual.*row.signal) : name))
+                bind(row.name, row.sensor ? if_there(name, usual.*row.signal) : name, row.unit))
             plan_for(*bound.message).status.push_back({&row, bound.signal});
     }
 

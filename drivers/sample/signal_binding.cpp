@@ -1,6 +1,7 @@
 #include "drivers/sample/signal_binding.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstddef>
 #include <numeric>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "drivers/sample/assembler.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::drivers {
 namespace {
@@ -65,6 +67,44 @@ std::string lines_of(const std::vector<BindingError>& all) {
 BindingError::BindingError(std::vector<BindingError> all)
     : std::runtime_error(lines_of(all)), key_(all.front().key()), value_(all.front().value()) {
     if (all.size() > 1) all_ = std::move(all);
+}
+
+void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
+                 std::string_view unit) {
+    if (!bound || unit.empty() || bound.signal->unit.empty() || bound.signal->unit == unit) return;
+    // Degree signs are of one byte in most files, of two in UTF-8.
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 18> kSpellings{
+        {{"deg", "\xb0"},
+         {"deg", "\xc2\xb0"},
+         {"deg", "degree"},
+         {"deg", "degrees"},
+         {"deg", "Deg"},
+         {"deg/h", "\xb0/h"},
+         {"deg/h", "\xc2\xb0/h"},
+         {"deg/h", "deg/hr"},
+         {"degC",
+          "\xb0"
+          "C"},
+         {"degC",
+          "\xc2\xb0"
+          "C"},
+         {"degC", "C"},
+         {"degC", "Celsius"},
+         {"degC", "deg C"},
+         {"g", "G"},
+         {"g", "gn"},
+         {"g", "g_n"},
+         {"g", "g0"},
+         {"arcsec", "\""}}};
+    const auto same = [&](const auto& one) {
+        return one.first == unit && one.second == bound.signal->unit;
+    };
+    if (std::ranges::any_of(kSpellings, same)) return;
+    throw BindingError(key, name,
+                       "a signal in " + std::string(unit) + "; in the DBC it is in " +
+                           proto::printable(bound.signal->unit) +
+                           " (scale, offset, range and unit there: those of " + std::string(unit) +
+                           ")");
 }
 
 BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name) {

@@ -19,6 +19,12 @@ struct BoundSignal {
 [[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key,
                                       const std::string& name);
 
+/// Throws BindingError where the DBC states another unit than `unit`, which the value is taken in;
+/// several spellings are known. A signal without a unit says nothing, and is believed; an empty
+/// `unit` expects none.
+void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
+                 std::string_view unit);
+
 /// Edit distance (Levenshtein), upper and lower case alike.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 

@@ -30,7 +30,9 @@ const proto::Dbc& moving_dbc() {
         proto::parse_dbc(std::string(proto::rig_dbc_text()) +
                              "\nBO_ 1500 BaseVelocity: 4 Vector__XXX\n"
                              " SG_ North : 0|16@1- (0.001,0) [-30|30] \"m/s\" Vector__XXX\n"
-                             " SG_ East : 16|16@1- (0.001,0) [-30|30] \"m/s\" Vector__XXX\n",
+                             " SG_ East : 16|16@1- (0.001,0) [-30|30] \"m/s\" Vector__XXX\n"
+                             "\nBO_ 1501 Log: 2 Vector__XXX\n"
+                             " SG_ East : 0|16@1- (0.001,0) [-30|30] \"kn\" Vector__XXX\n",
                          "moving.dbc");
     return dbc;
 }
@@ -159,6 +161,8 @@ TEST(MovingBase, OneComponentAloneAndUnknownSignalsAreRefusedWithTheKey) {
     EXPECT_THAT(refusal("", "BaseVelocity.East"), HasSubstr("levelling.velocity_north"));
     EXPECT_THAT(refusal("BaseVelocity.Noth", "BaseVelocity.East"), HasSubstr("North"));
     EXPECT_EQ(refusal("BaseVelocity.North", "BaseVelocity.East"), "");
+    EXPECT_THAT(refusal("BaseVelocity.North", "Log.East"),
+                HasSubstr("expected a signal in m/s; in the DBC it is in kn"));
     EXPECT_THAT(refusal("BaseVelocity.North", "BaseVelocity.North"),
                 HasSubstr("expected another signal than that of levelling.velocity_north"));
 }

@@ -1,6 +1,7 @@
 #include "drivers/gimbal/gimbal.hpp"
 
 #include <gtest/gtest.h>
+#include <algorithm>
 
 #include <cmath>
 #include <limits>
@@ -196,6 +197,22 @@ TEST(GimbalBinding, NamesWhatTheDbcLacks) {
         FAIL() << "bound to nothing";
     } catch (const BindingError& error) {
         EXPECT_NE(std::string(error.what()).find("GimbalCommand.Outer"), std::string::npos)
+            << error.what();
+    }
+}
+
+TEST(GimbalBinding, RefusesAnglesInAnotherUnit) {
+    RecordingPort port;
+    proto::Dbc dbc = rig_dbc();
+    const auto at = std::ranges::find(dbc.messages, "GimbalCommand", &proto::Message::name);
+    std::ranges::find(at->signals, "Inner", &proto::Signal::name)->unit = "mrad";
+    try {
+        const Gimbal gimbal(dbc, {}, port);
+        FAIL() << "would be commanded in the wrong unit";
+    } catch (const BindingError& error) {
+        EXPECT_NE(
+            std::string(error.what()).find("expected a signal in deg; in the DBC it is in mrad"),
+            std::string::npos)
             << error.what();
     }
 }

@@ -446,6 +446,30 @@ TEST(AssemblerBindings, NameAllThatIsMissingAtOnce) {
     }
 }
 
+TEST(AssemblerBindings, ASignalInAnotherUnitIsRefused) {
+    const auto refusal = [](const char* message, const char* signal, const char* unit) {
+        proto::Dbc dbc = rig_dbc();
+        auto at = std::ranges::find(dbc.messages, message, &proto::Message::name);
+        std::ranges::find(at->signals, signal, &proto::Signal::name)->unit = unit;
+        try {
+            const SampleAssembler assembler(dbc, rig_settings(), {});
+        } catch (const BindingError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_THAT(refusal("Resolvers", "Outer", "rad"),
+                HasSubstr("can.signals.outer: found \"Resolvers.Outer\", expected a signal in deg; "
+                          "in the DBC it is in rad"));
+    EXPECT_THAT(refusal("AccelerometersXY", "Y", "m/s^2"), HasSubstr("can.signals.accel_y"));
+    EXPECT_THAT(refusal("TableAccelerometer", "Axial", "mg"), HasSubstr("can.signals.table_accel"));
+    EXPECT_THAT(refusal("PlatformStatus", "Temperature", "K"),
+                HasSubstr("expected a signal in degC"));
+    // It says nothing, or the same in other letters.
+    for (const char* unit : {"", "deg", "degrees", "\xb0", "\xc2\xb0"})
+        EXPECT_EQ(refusal("Resolvers", "Outer", unit), "");
+}
+
 TEST(AssemblerBindings, RefuseSettingsThatCannotWork) {
     for (const auto& spoil : std::vector<std::function<void(AssemblerSettings&)>>{
              [](auto& s) { s.open_samples = 0; }, [](auto& s) { s.open_samples = 65; },

@@ -286,6 +286,22 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     EXPECT_EQ(refusal("0,0,,,,broad,0,,,,"),
               ":3: column gamma_deg: found nothing, expected a number");
     EXPECT_EQ(refusal("0,0,0,,,broad,0,verify,,,"), "");
+    const auto column = [&](const std::string& name) -> std::string {
+        write("plan.csv", "alpha_deg,beta_deg,gamma_deg,table_g," + name + "\n0,0,0,6,2\n");
+        try {
+            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
+        } catch (const vibrig::plan::PlanFileError& refused) {
+            return std::string(refused.what()).substr(path("plan.csv").size());
+        }
+        return "";
+    };
+    EXPECT_EQ(column("counts"),
+              ":1: column counts: found an unknown key, expected a known one, perhaps count");
+    EXPECT_EQ(
+        column("dwell_s"),
+        ":1: column dwell_s: found one of a run, expected none: it is campaign.dwell_s of the "
+        "configuration for all");
+    EXPECT_EQ(column("who"), "");
     write("plan.csv", head + "0,0,0,,,broad,0,,,,\n");
     try {
         static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
