@@ -1013,9 +1013,10 @@ def dialogue(checks, programs, folder):
                 line.sendall(f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode())
                 checks.check(line.recv(4096).startswith(b"HTTP/1.1 "), f"{what} is answered")
         checks.check(u.rig.daemon.running(), "what makes no sense harms nobody", u.rig.logs())
-        other = subprocess.run([u.rig.program("vibrig"), "commission", "units", "--by", "Ada", "--socket", u.rig.socket],
+        other = subprocess.run([u.rig.program("vibrig"), "commission", "units", "--by", "Ada", "--json", "--socket", u.rig.socket],
                                capture_output=True, text=True, check=False)
-        checks.check(other.returncode == 1 and "the platform's parts first: bus: no record" in other.stderr, "nothing shakes before the platform is known",
+        checks.check(other.returncode == 1 and "the platform's parts first: bus: no record" in other.stderr and
+                     json.loads(other.stdout or "{}").get("outcome") == "refused", "nothing shakes before the platform is known",
                      other.stderr)
         u.configure(platform={"gyro_y_axes": ["+x", "+y", "+z"], "gyro_z_axes": ["+z", "+y", "+x"]})
         check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)

@@ -4,12 +4,14 @@ disk is full, slow or dead, hundreds of clients hold the door. The table shakes 
 
 usage: stop_answered.py PROGRAMS
 """
+import contextlib
 import fcntl
 import json
 import os
 import shutil
 import signal
 import socket
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -214,6 +216,40 @@ def sick_disks(checks, rig, folder):
         disk.end()
 
 
+def armed_while_the_disk_takes_its_time(checks, rig, folder):
+    """What comes between an arming that is asked for and its being on disk counts: armed is who is fit then."""
+    os.mkdir(folder)
+    disk = disks.SickDisk(folder)
+    if disk.refused:
+        checks.skip("an arming on a slow disk", disk.refused)
+        return
+    try:
+        disk.remount("rw")
+        rig.results = disk.folder
+        rig.configure(CAMPAIGN, record={"folder": disk.folder, "segment_s": 3.0, "keep_free_mb": 0, "flush_s": 0.5}, **r.PATIENT)
+        start(rig, {**disk.environment(), "SICK_SECONDS": "1"})   # the daemon's patience is 2 s
+        rig.wait_for(lambda t: t["shaker"].get("rest") == "at rest" and t["journal"].get("verified"), 30)
+        disk.set("s")
+        with subprocess.Popen([rig.program("vibrig"), "arm", "--by", "Ada", "--socket", rig.socket], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              text=True) as arming:
+            time.sleep(0.2)
+            waits = arming.poll() is None
+            rig.order("estop open")
+            said = arming.communicate(timeout=30)[0]
+        status = rig.status()
+        checks.check(waits and arming.returncode == 1 and "emergency" in said and not status["campaign"].get("armed_by"),
+                     "a chain that opens while the arming is being written: it is not armed", f"{waits} {said} {r.state_of(status)}")
+        disk.set("-")
+        checks.check(rig.daemon.end(timeout=60) in (0, 1), "it ends")
+        with contextlib.closing(sqlite3.connect(os.path.join(disk.folder, "journal.sqlite3"))) as database:
+            what = [row[0] for row in database.execute("SELECT what FROM safety ORDER BY id")]
+        checks.equal([each for each in what if each in ("armed", "disarmed")], ["armed", "disarmed"], "and the journal says so")
+        rig.order("estop close")
+        rig.order("clear")
+    finally:
+        disk.end()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))   # or the disk would stay mounted
@@ -230,6 +266,7 @@ def main():
                 shutil.rmtree(rig.results)
                 os.mkdir(rig.results)
             sick_disks(checks, rig, folder)
+            armed_while_the_disk_takes_its_time(checks, rig, os.path.join(folder, "slow"))
         finally:
             rig.stop()
     checks.note(f"{time.monotonic() - begun:.0f} s")

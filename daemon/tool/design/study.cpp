@@ -13,6 +13,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "daemon/tool/design/study_submit.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
@@ -114,7 +115,11 @@ void tell(const char* what, const std::vector<std::string>& lines) {
 void write_result(const StudyOptions& o, const Json& result) {
     if (!o.output.empty()) plot::write_file(o.output, proto::json_text(result, 1) + "\n");
     if (!o.csv.empty()) plot::write_file(o.csv, studies::result_csv(result));
-    if (!o.hdf5.empty()) studies::write_hdf5(result, o.hdf5);
+    if (!o.hdf5.empty()) {
+        proto::OutputFile file(o.hdf5);
+        studies::write_hdf5(result, file.place());
+        file.finish();
+    }
     if (!o.plot.empty()) {
         const std::string remark = studies::write_charts(result, o.plot);
         if (!remark.empty()) std::cerr << o.plot << ": " << remark << '\n';

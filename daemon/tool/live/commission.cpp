@@ -326,13 +326,18 @@ int commission(const CommissionOptions& options) {
 
 /// The daemon that says no is an answer, not bad input.
 template <class Run>
-int guarded_commission(Run run) {
+int guarded_commission(Run run, bool json) {
     return guarded(
         [&] {
             try {
                 return run();
             } catch (const CommissionRefused& refused) {
                 std::cerr << kCommission << refused.what() << '\n';
+                if (json)
+                    std::cout << proto::json_text(CommissionJson{{"outcome", "refused"},
+                                                                 {"why", refused.what()}},
+                                                  1)
+                              << '\n';
                 return kNo;
             }
         },
@@ -343,7 +348,7 @@ template <class Run>
 void run_as(CLI::App& command, int& exit_code, std::shared_ptr<CommissionOptions> options,
             Run run) {
     command.callback([&exit_code, options, run] {
-        exit_code = guarded_commission([&] { return run(*options); });
+        exit_code = guarded_commission([&] { return run(*options); }, options->json);
     });
 }
 
@@ -443,11 +448,13 @@ void add_commission(CLI::App& app, int& exit_code) {
 
     commissioning.callback([&commissioning, &exit_code, options] {
         if (!commissioning.get_subcommands().empty()) return;  // it has done its own
-        exit_code = guarded_commission([&] {
-            if (options->by.empty())
-                throw std::runtime_error("--by: found nothing, expected a name");
-            return commission(*options);
-        });
+        exit_code = guarded_commission(
+            [&] {
+                if (options->by.empty())
+                    throw std::runtime_error("--by: found nothing, expected a name");
+                return commission(*options);
+            },
+            options->json);
     });
 }
 
