@@ -121,6 +121,9 @@ OutputFile::OutputFile(const std::string& path) : path_(path), target_(end_of_li
     place_ = target_.empty() ? path : target_ + ".unfinished";
     if (target_.empty()) return;
     check_output(place_);
+    // A folder of one's own would let it be replaced.
+    if (::access(target_.c_str(), F_OK) == 0 && ::access(target_.c_str(), W_OK) != 0)
+        cannot(path_, "written", errno);
     ::unlink(place_.c_str());
     const int file =
         ::open(place_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);

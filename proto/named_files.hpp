@@ -18,8 +18,8 @@ namespace named_files {
 
 /// Options whose values are written; whatever else names a file is read.
 [[nodiscard]] inline bool is_written(const CLI::Option& option) {
-    constexpr std::array<std::string_view, 7> kNames{"output", "plot",        "pdf",       "csv",
-                                                     "write",  "write-truth", "write-mean"};
+    constexpr std::array<std::string_view, 8> kNames{
+        "output", "plot", "pdf", "csv", "hdf5", "write", "write-truth", "write-mean"};
     return std::ranges::any_of(option.get_lnames(), [&](const std::string& name) {
         return std::ranges::find(kNames, name) != kNames.end();
     });

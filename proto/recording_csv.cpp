@@ -121,7 +121,10 @@ class RecordingReader::Rows {
         /// The line where the same samples began before; 0: they are new, or too few to tell yet.
         [[nodiscard]] std::size_t add(const RecordingRow& row) {
             if (rows_ == kTold) return 0;
-            mix(row.time_s);
+            // Whoever copies a dwell may have moved it in time: to the nanosecond it is one all the
+            // same.
+            if (rows_ == 0) began_s_ = row.time_s;
+            mix(std::round((row.time_s - began_s_) * 1e9));
             const auto before = std::exchange(readings_, {row.angle_deg, row.force_g});
             for (const double angle : row.angle_deg) mix(angle);
             for (const double force : row.force_g) mix(force);
@@ -144,6 +147,7 @@ class RecordingReader::Rows {
         }
 
         std::size_t line_ = 0, rows_ = 0, changes_ = 0;
+        double began_s_ = 0;
         std::pair<std::array<double, 3>, std::array<double, 3>> readings_{};
         std::uint64_t hash_ = kFnvOffset;
         std::unordered_map<std::uint64_t, std::size_t> begun_;  ///< lines by their first rows

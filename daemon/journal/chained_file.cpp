@@ -49,7 +49,9 @@ Database& ChainedFile::database() {
 }
 
 std::vector<std::string> ChainedFile::open() {
-    refuse_foreign(path_, {"event", "chain"});
+    // With a head or a key beside it, it was ours: what lies there now is put aside.
+    if (!exists(path_ + kHeadSuffix) && !exists(path_ + kKeySuffix))
+        refuse_foreign(path_, {"event", "chain"});
     std::vector<std::string> found;
     const FoundHead beside = read_head(path_ + kHeadSuffix);
     if (!beside.wrong.empty()) found.push_back(beside.wrong);

@@ -27,26 +27,40 @@ std::string number(double value) { return Json(value).dump(); }
 /// What a run does not have of its own, and of which no name is a misspelt one.
 constexpr std::array<std::string_view, 3> kOfTheCampaign{"dwell_s", "settle_s", "ramp_s"};
 
-/// Throws where `key` is not among `known` and is meant to be one, or to be the run's own.
-void refuse_key(std::string_view key, const std::vector<std::string_view>& known,
-                const std::string& place, bool run) {
+bool any_of(const std::vector<std::string_view>& names, std::string_view name) {
+    return std::ranges::find(names, name) != names.end();
+}
+
+/// Throws where one of `keys` is not among `known` and is meant to be one that is not there, or to
+/// be the run's own. What resembles none, a remark of somebody's, may stand there.
+void refuse_unknown(const std::vector<std::string_view>& keys,
+                    const std::vector<std::string_view>& known, bool run,
+                    const std::function<std::string(const std::string&)>& place_of) {
     constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
-    if (key.size() > kLongest || std::ranges::find(known, key) != known.end()) return;
-    if (run && std::ranges::find(kOfTheCampaign, key) != kOfTheCampaign.end())
-        refuse(place, "one of a run",
-               "none: it is campaign." + std::string(key) + " of the configuration for all");
-    for (const std::string_view name : known) {
-        if (proto::edits(key, name) * kLettersPerEdit <= key.size())
-            refuse(place, "an unknown key", "a known one, perhaps " + std::string(name));
+    constexpr std::string_view kHz = "_hz";
+    const bool has_hz = std::ranges::any_of(
+        keys, [&](std::string_view key) { return key.ends_with(kHz) && any_of(known, key); });
+    for (const std::string_view key : keys) {
+        if (key.size() > kLongest || any_of(known, key)) continue;
+        const std::string place = place_of(proto::printable(key));
+        if (run && std::ranges::find(kOfTheCampaign, key) != kOfTheCampaign.end())
+            refuse(place, "one of a run",
+                   "none: it is campaign." + std::string(key) + " of the configuration for all");
+        if (run && key.ends_with(kHz) && !has_hz)
+            refuse(place, "an unknown key", "a known one, perhaps frequency_hz");
+        for (const std::string_view name : known) {
+            if (!any_of(keys, name) && proto::edits(key, name) * kLettersPerEdit <= key.size())
+                refuse(place, "an unknown key", "a known one, perhaps " + std::string(name));
+        }
     }
 }
 
-/// A misspelt key would leave the rig to its configuration without a word. What resembles none, a
-/// remark of somebody's, may stand there.
+/// A misspelt key would leave the rig to its configuration without a word.
 void refuse_unknown(const Json& object, const std::vector<std::string_view>& known,
                     const std::string& place, bool run = false) {
-    for (const auto& [key, value] : object.items())
-        refuse_key(key, known, place + "." + proto::printable(key), run);
+    std::vector<std::string_view> keys;
+    for (const auto& one : object.items()) keys.emplace_back(one.key());
+    refuse_unknown(keys, known, run, [&](const std::string& key) { return place + "." + key; });
 }
 
 void check_position(const std::array<double, 3>& position, const std::string& place) {
@@ -207,42 +221,6 @@ PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
     return run;
 }
 
-/// What stands beside the runs: what vibrig plan writes.
-void check_keys(const Json& plan, const std::string& path) {
-    refuse_unknown(plan,
-                   {"d_efficiency",
-                    "bound",
-                    "rank",
-                    "runs",
-                    "standard_errors",
-                    "duration_s",
-                    "slewing_s",
-                    "vibrating_s",
-                    "dwell_s",
-                    "transmission",
-                    "frequency_hz",
-                    "coefficients",
-                    "run_count",
-                    "a_efficiency",
-                    "e_efficiency_at_least",
-                    "condition",
-                    "unit_standard_errors",
-                    "strongest_correlation",
-                    "drift_imbalance",
-                    "optimal_shares",
-                    "optimum_gap",
-                    "warnings",
-                    "survey",
-                    "sweeps",
-                    "order_inflation",
-                    "combined_uncertainty",
-                    "expanded_uncertainty",
-                    "refusal",
-                    "undetermined",
-                    "vertical_axes"},
-                   path + ": plan");
-}
-
 /// The plan's rig against this one, in what its runs take from it.
 void check_rig(const Json& plan, const std::vector<PlannedRun>& runs,
                const TransmissionAt& transmission, std::optional<double> rig_hz,
@@ -279,7 +257,8 @@ PlanFile runs_from_json(const std::string& text, const std::string& path,
     }
     const auto runs = json.find("runs");
     if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");
-    check_keys(json, path);
+    // What vibrig plan writes beside the runs, and what of it is read.
+    refuse_unknown(json, {"runs", "dwell_s", "transmission", "frequency_hz"}, path + ": plan");
     PlanFile result{{}, number_at(json, "dwell_s", path + ": plan")};
     if (result.dwell_s && !(*result.dwell_s > 0))
         refuse(path + ": plan.dwell_s", number(*result.dwell_s), "more than 0 s");
@@ -402,8 +381,8 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
     std::vector<std::string_view> known = form.numbers;
     known.insert(known.end(), form.maybe_numbers.begin(), form.maybe_numbers.end());
     known.insert(known.end(), form.words.begin(), form.words.end());
-    for (const std::string& name : table.names)
-        refuse_key(name, known, path + ":1: column " + proto::printable(name), true);
+    refuse_unknown({table.names.begin(), table.names.end()}, known, true,
+                   [&](const std::string& name) { return path + ":1: column " + name; });
     const auto positions = positions_of(table, path);
     std::vector<PlannedRun> result;
     for (std::size_t i = 0; i < positions.size(); ++i)

@@ -66,6 +66,7 @@ class FrameReader {
           settings_(assembler_settings(configuration, folder)),
           to_(to),
           utc_offset_ns_(utc_offset_ns) {
+        settings_.units_checked = false;
         begin();
         if (const auto* message = dbc_.find("RigTime")) {
             rig_time_ = message;

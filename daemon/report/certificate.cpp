@@ -21,6 +21,9 @@ using record::Campaign;
 
 namespace {
 
+/// Peak, at kappa = 1.001, which the drift does not feel.
+constexpr double kTremble_g = 0.045;
+
 /// With what the dwells shook that the coefficients rest on: "sinusoidal, random and swept-sine".
 std::string kinds_of_vibration(const Json& result) {
     const auto found = result.find("spectrum");
@@ -43,9 +46,12 @@ std::string kinds_of_vibration(const Json& result) {
 std::string method_of(const Json& result) {
     // Results of earlier versions have no rates of the dwells.
     const Json rates = result.value("dwell_rates", Json::array());
-    const bool rested = rates.empty() || std::ranges::any_of(rates, [](const Json& rate) {
-                            return rate.value("level", Json()) == 0;
-                        });
+    const bool rested =
+        rates.empty() || std::ranges::any_of(rates, [](const Json& rate) {
+            // Floors tremble; kappa stays below 1.001.
+            const auto level = rate.find("level");
+            return level != rate.end() && level->is_number() && level->get<double>() < kTremble_g;
+        });
     return fmt::format(
         "Identification under linear vibration (Tang et al. 2009): 30 coefficients from the "
         "platform's drift {}under {} vibration along the vertical, estimated jointly.",

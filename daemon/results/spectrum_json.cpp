@@ -345,6 +345,7 @@ void read_correlated(const ReadJson& spectrum, const std::string& place, Model& 
     const auto pairs = spectrum.find("effects_correlation");
     if (pairs == spectrum.end()) return;
     const std::size_t count = model.effects.size();
+    MatrixXd all = MatrixXd::Identity(static_cast<Index>(count), static_cast<Index>(count));
     for (const auto& pair : *pairs) {
         const bool whole = pair.is_array() && pair.size() == 3 && pair[0].is_number_unsigned() &&
                            pair[1].is_number_unsigned() && pair[2].is_number();
@@ -352,12 +353,16 @@ void read_correlated(const ReadJson& spectrum, const std::string& place, Model& 
                                                                     pair[1].get<std::size_t>(),
                                                                     pair[2].get<double>()}
                                : estimator::uncertainty::Correlated{};
-        if (!whole || one.first >= count || one.second >= count ||
-            !(std::abs(one.value) <= 1 + 1e-9))
+        const auto first = static_cast<Index>(one.first), second = static_cast<Index>(one.second);
+        if (!whole || one.first >= one.second || one.second >= count ||
+            !(std::abs(one.value) <= 1 + kRounding) || all(first, second) != 0)
             refuse(place + "effects_correlation", shown(pair),
-                   "two of " + std::to_string(count) + " effects and a number from -1 to 1");
+                   "two of " + std::to_string(count) +
+                       " effects, the earlier first, once, and a number from -1 to 1");
+        all(first, second) = all(second, first) = one.value;
         model.correlated.push_back(one);
     }
+    if (!model.correlated.empty()) check_covariance(all, place + "effects_correlation");
 }
 
 }  // namespace

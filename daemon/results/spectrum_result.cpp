@@ -168,7 +168,7 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
     SpectralTable table(settings, std::move(dwells), std::move(kinds));
     Analysis analysis = analyse(settings, table, form, sweeps);
     const double hz = table.kinds().empty() ? 0 : table.kinds().front().hz();
-    const bool compromise = form == Form::flat && analysis.flat.alarm;
+    const bool compromise = analysis.form == Form::flat && analysis.flat.alarm;
     return {std::move(analysis), std::move(table), hz, {}, std::move(sweeps), compromise};
 }
 
@@ -225,7 +225,11 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
               "over frequency nothing is freed: an error in what estimator.free names is in the "
               "coefficients",
               uncertainty::Level::not_valid);
-    if (of.flat.alarm && of.form != Form::resonance)
+    // A resonance that is a little likelier than none is no explanation.
+    const bool explained =
+        of.form == Form::resonance &&
+        std::ranges::any_of(of.gyros, [](const auto& gyro) { return gyro.named(); });
+    if (of.flat.alarm && !explained)
         doubt(assessed, "quadratic coefficients depend on the frequency (p = " +
                             std::to_string(of.flat.p) + " that they do not)");
     if (!of.model.refusal.empty()) doubt(assessed, of.model.refusal);

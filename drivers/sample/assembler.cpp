@@ -79,7 +79,7 @@ struct SampleAssembler::Impl {
     Impl(const proto::Dbc& dbc, const AssemblerSettings& s, SampleHandler handler)
         : settings(s),
           on_sample(std::move(handler)),
-          plan(dbc, s.bindings, static_cast<std::uint32_t>(s.samples_per_frame)),
+          plan(dbc, s.bindings, static_cast<std::uint32_t>(s.samples_per_frame), s.units_checked),
           clock(s.sample_period),
           parts(static_cast<std::uint32_t>(s.samples_per_frame)),
           // As many frames out of order as with one sample in each, but no more samples than that.

@@ -41,6 +41,8 @@ struct AssemblerSettings {
     std::uint32_t open_samples = 8;            ///< sync counts joined at a time (reordering depth)
     /// In each frame that carries a channel, 1 to 16; its count is that of the first one.
     int samples_per_frame = 1;
+    /// Signals in another unit are refused. Not in a recording, which nobody can mend.
+    bool units_checked = true;
 };
 
 /// received = used + unknown + duplicate + late + wrong_length

@@ -47,7 +47,7 @@ class FramePlan {
   public:
     /// `samples_per_frame`: signal S carries the first one's value, S_1, S_2, ... the others'.
     FramePlan(const proto::Dbc& dbc, const SignalBindings& bindings,
-              std::uint32_t samples_per_frame = 1);
+              std::uint32_t samples_per_frame = 1, bool units_checked = true);
 
     /// Null: nothing of this message is bound.
     [[nodiscard]] const MessagePlan* find(std::uint32_t id, bool extended) const noexcept;

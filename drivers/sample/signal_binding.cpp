@@ -71,35 +71,19 @@ BindingError::BindingError(std::vector<BindingError> all)
 
 void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
                  std::string_view unit) {
-    if (!bound || unit.empty() || bound.signal->unit.empty() || bound.signal->unit == unit) return;
-    // Degree signs are of one byte in most files, of two in UTF-8.
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 18> kSpellings{
-        {{"deg", "\xb0"},
-         {"deg", "\xc2\xb0"},
-         {"deg", "degree"},
-         {"deg", "degrees"},
-         {"deg", "Deg"},
-         {"deg/h", "\xb0/h"},
-         {"deg/h", "\xc2\xb0/h"},
-         {"deg/h", "deg/hr"},
-         {"degC",
-          "\xb0"
-          "C"},
-         {"degC",
-          "\xc2\xb0"
-          "C"},
-         {"degC", "C"},
-         {"degC", "Celsius"},
-         {"degC", "deg C"},
-         {"g", "G"},
-         {"g", "gn"},
-         {"g", "g_n"},
-         {"g", "g0"},
-         {"arcsec", "\""}}};
-    const auto same = [&](const auto& one) {
-        return one.first == unit && one.second == bound.signal->unit;
-    };
-    if (std::ranges::any_of(kSpellings, same)) return;
+    // What a file is likely to state in place of deg, g, degC, m/s, arcsec and deg/h.
+    static constexpr std::array<std::string_view, 38> kUnits{
+        "rad",    "mrad",    "urad",        "turn",   "turns",    "rev",  "revs", "gon",
+        "arcmin", "arcsec",  "mdeg",        "deg",    "g",        "mg",   "ug",   "m/s^2",
+        "m/s2",   "m/s\xb2", "m/s\xc2\xb2", "cm/s^2", "k",        "degf", "degc", "m/s",
+        "mm/s",   "cm/s",    "km/h",        "kn",     "knots",    "mph",  "ft/s", "rad/s",
+        "mrad/s", "deg/s",   "deg/min",     "rad/h",  "arcsec/s", "deg/h"};
+    if (!bound || unit.empty()) return;
+    std::string stated(proto::trimmed(bound.signal->unit));
+    std::ranges::transform(stated, stated.begin(), lower);
+    std::string expected(unit);
+    std::ranges::transform(expected, expected.begin(), lower);
+    if (stated == expected || std::ranges::find(kUnits, stated) == kUnits.end()) return;
     throw BindingError(key, name,
                        "a signal in " + std::string(unit) + "; in the DBC it is in " +
                            proto::printable(bound.signal->unit) +

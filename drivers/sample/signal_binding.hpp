@@ -19,9 +19,9 @@ struct BoundSignal {
 [[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key,
                                       const std::string& name);
 
-/// Throws BindingError where the DBC states another unit than `unit`, which the value is taken in;
-/// several spellings are known. A signal without a unit says nothing, and is believed; an empty
-/// `unit` expects none.
+/// Throws BindingError where the DBC states another unit, one that is known here, than `unit`,
+/// which the value is taken in. No unit, counts, or a word that nobody knows says nothing, and is
+/// left to commissioning; an empty `unit` expects none.
 void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
                  std::string_view unit);
 

@@ -9,6 +9,7 @@
 #include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/declared_rates.hpp"
+#include "estimator/uncertainty/breaks.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/drift_states.hpp"
 #include "estimator/uncertainty/signatures.hpp"
@@ -310,7 +311,8 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         const VectorXd sigma = grouped_prior(prior.col(g), columns);
         // What a level's error does is known once the coefficients are.
         for (int pass = 0; pass < (twice ? 2 : 1); ++pass) {
-            const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
+            auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
+            gyro.breaks = uncertainty::breaks_of(times, settings.drift);
             groups[j] = uncertainty::average_drift(gyro, settings.drift);
             const uncertainty::DriftAverage& average = groups[j];
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);

@@ -5,25 +5,24 @@
 namespace vibrig::estimator::uncertainty {
 namespace {
 
-/// Dwells after which each run of a plain order ends. An order that goes back to former runs mixes
-/// the levels, and nobody switches the gyros off at each change of level; a repeat or two of a
-/// former run's dwells makes no mixed order.
+/// Dwells after which another run begins or a former one goes on. An order that goes back to former
+/// runs again and again mixes the levels, and nobody switches the gyros off at each change of
+/// level; a dwell or two of a former run, at rest or repeated, make no mixed order.
 std::vector<std::size_t> ends_of_runs(const DwellTable& table) {
-    constexpr std::size_t kRepeats = 8;  // one of so many
+    constexpr std::size_t kBack = 8;  // of so many dwells one
     std::vector<std::size_t> ends;
     std::set<int> begun;
     std::size_t back = 0;
     int newest = 0;
     for (std::size_t k = 0; k < table.rows.size(); ++k) {
         const int run = table.rows[k].run;
-        if (begun.insert(run).second) {
-            if (k > 0) ends.push_back(k);
+        if (begun.insert(run).second)
             newest = run;
-        } else if (run != newest) {
+        else if (run != newest)
             ++back;
-        }
+        if (k > 0 && run != table.rows[k - 1].run) ends.push_back(k);
     }
-    if (kRepeats * back > table.rows.size()) return {};
+    if (kBack * back > table.rows.size()) return {};
     return ends;
 }
 

@@ -94,8 +94,11 @@ void expand(const Inputs& inputs, std::size_t internal, double spare, double gro
     double inverse = rho * rho / inputs.noise_dof;
     if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
     double sum = std::pow(c.u_a, 4) * inverse;
-    for (const Contribution& one : c.budget)
-        if (std::isfinite(one.dof)) sum += std::pow(one.contribution, 4) / one.dof;
+    // Its part of the variance with what it shares: of a pair that cancels nothing is left to vary.
+    for (const Contribution& one : c.budget) {
+        const double part = one.contribution * one.contribution + one.with_own + one.with_others;
+        if (std::isfinite(one.dof)) sum += part * part / one.dof;
+    }
     c.nu_eff = sum > 0 ? std::pow(c.u, 4) / sum : std::numeric_limits<double>::infinity();
     c.k = student_quantile(inputs.coverage, std::max(1.0, std::floor(c.nu_eff)));
     c.expanded = c.k * c.u;

@@ -60,7 +60,7 @@ class InputDraws {
             if (correlated_[i] > 0) continue;
             const InputSignature& input = list_[static_cast<std::size_t>(i)];
             const double u = input.declared.u;
-            if (input.with_next) {
+            if (input.with_next && !(correlated_[i + 1] > 0)) {
                 const double phase = 2 * kPi * uniform_(random), a = std::sqrt(2.0) * u;
                 out[i] = a * std::cos(phase);
                 out[i + 1] = a * std::sin(phase);

@@ -1,4 +1,5 @@
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -117,6 +118,7 @@ void write_result(const StudyOptions& o, const Json& result) {
     if (!o.csv.empty()) plot::write_file(o.csv, studies::result_csv(result));
     if (!o.hdf5.empty()) {
         proto::OutputFile file(o.hdf5);
+        std::filesystem::remove(file.place());  // HDF5 makes it anew
         studies::write_hdf5(result, file.place());
         file.finish();
     }

@@ -39,9 +39,14 @@ constexpr const char* kRevoked = "revoked.crl";
 
 /// Keys are for their owner only, from the moment they exist.
 void write(const fs::path& path, const std::string& text, bool secret) {
-    const mode_t before = ::umask(secret ? 0077 : 0022);
+    struct Mask {
+        explicit Mask(mode_t mask) : before(::umask(mask)) {}
+        ~Mask() { ::umask(before); }
+        Mask(const Mask&) = delete;
+        Mask& operator=(const Mask&) = delete;
+        mode_t before;
+    } const mask(secret ? 0077 : 0022);
     proto::write_durably(path.string(), text, secret ? 0600 : 0644);
-    ::umask(before);
 }
 
 std::string read(const fs::path& path) {
@@ -158,10 +163,10 @@ int revoke(const PkiOptions& options) {
     for (const std::string& name : options.revoked) {
         const fs::path certificate = folder / (name + ".crt");
         if (name == kAuthority) throw PkiError("the authority cannot revoke itself");
+        const std::string before = fs::exists(list) ? read(list) : std::string{};
         std::string text;
         try {
-            text = serve::revoke(read(certificate), authority,
-                                 fs::exists(list) ? read(list) : std::string{});
+            text = serve::revoke(read(certificate), authority, before);
         } catch (const PkiError& error) {
             throw PkiError("found '" + name + "', expected somebody with a valid certificate in " +
                            folder.string() + ": " + error.what());

@@ -30,7 +30,10 @@ void print_pdf(const std::string& html, const std::string& pdf) {
     ::waitpid(child, &status, 0);
     std::error_code ignored;
     fs::remove_all(folder, ignored);
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || !fs::exists(pdf))
+    // The file may be there already, empty.
+    const auto size = fs::file_size(pdf, ignored);
+    const bool printed = !ignored && size > 0;
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || !printed)
         throw std::runtime_error(pdf + (WIFEXITED(status) && WEXITSTATUS(status) == 127
                                             ? ": found no chromium, expected it to print"
                                             : ": chromium could not print it"));

@@ -164,8 +164,8 @@ int replay(const ReplayArguments& arguments) {
     const auto& files = arguments.files;
     bool whole = true;
     if (std::ranges::none_of(files, is_log)) {
-        // What is gone was named when the campaign was read.
-        whole = record::gone_raw(campaign.folder, [](const auto&) {}).empty();
+        // Its samples are those of the HDF5 files. What is gone of the frames was named when the
+        // campaign was read; a file that is cut there may not be the only one.
         for (const auto& words : record::cut_raw(campaign.folder)) {
             std::cerr << campaign.folder << ": missing " << words << '\n';
             whole = false;

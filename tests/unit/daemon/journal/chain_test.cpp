@@ -329,6 +329,12 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
              Database(path).execute("CREATE TABLE event (id INTEGER)");
          },
          "found version 0"},
+        {"somebody else's database", false,
+         [&] {
+             fs::remove(path);
+             Database(path).execute("CREATE TABLE file (id INTEGER)");
+         },
+         "found version 0"},
         {"no database", false, [&] { std::ofstream(path) << std::string(9000, 'x'); },
          "is damaged: it does not begin as an SQLite file does"},
         {"halved", false, [&] { cut(path); },

@@ -301,7 +301,13 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
         column("dwell_s"),
         ":1: column dwell_s: found one of a run, expected none: it is campaign.dwell_s of the "
         "configuration for all");
+    EXPECT_EQ(
+        column("freq_hz"),
+        ":1: column freq_hz: found an unknown key, expected a known one, perhaps frequency_hz");
+    // Remarks beside what they resemble.
     EXPECT_EQ(column("who"), "");
+    EXPECT_EQ(column("alpha_rad"), "");
+    EXPECT_EQ(column("frequency_hz,freq_hz"), "");
     write("plan.csv", head + "0,0,0,,,broad,0,,,,\n");
     try {
         static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
