@@ -116,6 +116,18 @@ void check_output(const std::string& path) {
                                  "write");
 }
 
+void refuse_same(const std::vector<std::string>& outputs) {
+    std::vector<fs::path> seen;
+    for (const std::string& path : outputs) {
+        std::error_code error;
+        fs::path target = fs::weakly_canonical(fs::absolute(path), error);
+        if (error || path.empty() || path == "-" || is_device(target.string())) continue;
+        if (std::ranges::find(seen, target) != seen.end())
+            throw std::runtime_error(path + ": found it twice to be written, expected two files");
+        seen.push_back(std::move(target));
+    }
+}
+
 OutputFile::OutputFile(const std::string& path) : path_(path), target_(end_of_links(path)) {
     check_output(path);
     place_ = target_.empty() ? path : target_ + ".unfinished";

@@ -15,6 +15,9 @@ void write_durably(const std::string& path, std::string_view text, unsigned mode
 /// database, or what lies beside a campaign's files) or one of those that were named by
 /// name_inputs(). Throws std::runtime_error that names it.
 void check_output(const std::string& path);
+/// Refuses two outputs of one name: the second would take the first one's place. Devices and "-"
+/// may be named twice. Throws std::runtime_error that names it.
+void refuse_same(const std::vector<std::string>& outputs);
 /// The files that this run of the program reads; what is no file among them does not matter.
 void name_inputs(std::vector<std::string> paths);
 

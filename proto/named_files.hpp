@@ -45,6 +45,7 @@ inline void keep_named_files(CLI::App& app) {
         named_files::collect(app, read, written);
         name_inputs(std::move(read));
         for (const std::string& path : written) check_output(path);
+        refuse_same(written);
     });
 }
 

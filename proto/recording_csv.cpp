@@ -292,7 +292,7 @@ class RecordingReader::Rows {
                     row.level_db = field.empty() ? 0 : real(role, field);
                     break;
                 case kRole:
-                    row.held_out = field == "verify";
+                    row.held_out = held_out(field);
                     break;
                 default:
                     if (role < kForces) {
@@ -304,6 +304,14 @@ class RecordingReader::Rows {
         }
         check_time(row, time_text);
         return row;
+    }
+
+    bool held_out(std::string_view field) const {
+        if (same("verify", field)) return true;
+        if (!field.empty() && !same("identify", field))
+            fail(kColumns.at(kRole).name,
+                 "found " + quoted(field) + ", expected \"identify\" or \"verify\"");
+        return false;
     }
 
     double frequency(std::string_view field) const {
@@ -374,9 +382,15 @@ class RecordingReader::Rows {
                      ", the time before it in run " + std::to_string(row.run) + ", position " +
                      std::to_string(row.position));
         }
-        if (!last_time_ || pair != dwell_) copies_.begin(row.line);
+        const bool begins = !last_time_ || pair != dwell_;
+        if (begins) copies_.begin(row.line);
+        if (!begins && row.held_out != held_out_)
+            fail(kColumns.at(kRole).name,
+                 "found another role within run " + std::to_string(row.run) + ", position " +
+                     std::to_string(row.position) + ", expected one for all of a dwell");
         last_time_ = row.time_s;
         dwell_ = pair;
+        held_out_ = row.held_out;
         refuse_copy(row);
     }
 
@@ -387,7 +401,7 @@ class RecordingReader::Rows {
         throw RecordingError(path_, copies_.line(), "",
                              "found run " + std::to_string(row.run) + ", position " +
                                  std::to_string(row.position) +
-                                 " with the times and samples of the dwell of line " +
+                                 " with the samples of the dwell of line " +
                                  std::to_string(before) + ", expected each dwell once");
     }
 
@@ -401,6 +415,7 @@ class RecordingReader::Rows {
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
     std::pair<int, int> dwell_;
     std::optional<double> last_time_;  ///< of the dwell in force
+    bool held_out_ = false;            ///< the dwell of the newest row
     CopiesSeen copies_;
 };
 

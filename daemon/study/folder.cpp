@@ -156,6 +156,8 @@ Folder plan_study(const std::string& file, const std::string& folder,
     return open_study(folder);
 }
 
+bool is_of_plan(const std::string& name) { return name == kPlanFile || name == kStudyFile; }
+
 Folder open_study(const std::string& path) {
     Folder out;
     out.path = path;

@@ -28,6 +28,9 @@ struct Folder {
 Folder plan_study(const std::string& file, const std::string& folder,
                   const std::string& instruction_set);
 
+/// Whether a file of this name in a study's folder is what was planned.
+[[nodiscard]] bool is_of_plan(const std::string& name);
+
 /// Throws StudyError when it is none, or its files are not those that were planned.
 [[nodiscard]] Folder open_study(const std::string& folder);
 

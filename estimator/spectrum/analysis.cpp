@@ -67,8 +67,7 @@ uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::D
     uncertainty::GyroRates gyro;
     const Index n = table.dwells(), g = static_cast<Index>(j);
     gyro.time_h = times.time_h;
-    gyro.rate.resize(n);
-    gyro.variance.resize(n);
+    gyro.rate = gyro.variance = VectorXd::Zero(n);
     for (Index k = 0; k < n; ++k) {
         const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
         gyro.rate[k] = dwell.row.rate[j];
@@ -286,10 +285,7 @@ const char* name_of(Form form) noexcept {
     return kNames[static_cast<std::size_t>(form)];
 }
 
-bool Analysis::resonant() const {
-    return std::any_of(gyros.begin(), gyros.end(),
-                       [](const Mixture& one) { return one.resonant(); });
-}
+bool Analysis::resonant() const { return std::ranges::any_of(gyros, &Mixture::resonant); }
 
 Analysis analyse(const Settings& settings, const SpectralTable& table, Form form,
                  const std::vector<Sweep>& sweeps) {

@@ -112,6 +112,10 @@ def pieces(b):
         b.same(folder, f"{count} shards give the same to the last bit")
     status = json.loads(b.study("status", folder, "--json").stdout)
     b.checks.equal((status["done"], status["missing"], status["parts"]), (120, 0, 7), "status counts tasks and parts")
+    own = [os.path.join(folder, "study.json"), os.path.join(folder, "STUDY.toml"), os.path.join(folder, "parts", "of-mine")]
+    refused = [b.study("merge", folder, option, place) for option in ("-o", "--csv", "--hdf5") for place in own]
+    b.checks.check(all(run.returncode == 2 and "found a file of the study that is merged" in run.stderr for run in refused) and
+                   b.study("status", folder).returncode == 0, "a merged study is not written over", refused)
     run = b.study("merge", folder, "--compact")
     b.checks.equal((run.returncode, len(b.parts(folder))), (0, 1), "parts are compacted to one")
     b.same(folder, "which gives the same")

@@ -129,8 +129,25 @@ void write_result(const StudyOptions& o, const Json& result) {
     std::cout << (o.json ? proto::json_text(result, 1) + "\n" : studies::result_table(result));
 }
 
+/// What a study is made of is no place for what comes of it.
+void keep_study(const study::Folder& folder, const StudyOptions& o) {
+    namespace fs = std::filesystem;
+    std::error_code none;
+    for (const std::string& output : {o.output, o.csv, o.hdf5, o.plot}) {
+        const fs::path place = output.empty() ? fs::path() : fs::absolute(output).parent_path();
+        const bool own = !output.empty() && (fs::equivalent(place, folder.parts(), none) ||
+                                             (fs::equivalent(place, folder.path, none) &&
+                                              study::is_of_plan(fs::path(output).filename())));
+        if (own)
+            throw study::StudyError(output +
+                                    ": found a file of the study that is merged, expected "
+                                    "another to write");
+    }
+}
+
 int merge(const StudyOptions& o) {
     const auto folder = study::open_study(o.folder);
+    keep_study(folder, o);
     study::Merged merged(folder);
     study::Reduction reduction(folder);
     for (study::TaskRecord record; merged.next(record);) reduction.add(record.index, record.bytes);

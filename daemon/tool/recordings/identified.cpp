@@ -65,7 +65,8 @@ class RowsSeen {
     struct Row {
         estimator::Measurement measurement;
         int run = 0, position = 0;
-        bool begins = false;  ///< another dwell
+        bool begins = false;    ///< another dwell
+        bool held_out = false;  ///< to prove a result
     };
 
     explicit RowsSeen(const estimator::Settings& settings) : doubts_(settings), plan_(settings) {}
@@ -74,7 +75,7 @@ class RowsSeen {
     /// begins another.
     [[nodiscard]] Row see(const RecordingRow& row) {
         Row seen{measurement_of(row), row.run, row.position,
-                 !any_ || row.run != run_ || row.position != position_};
+                 !any_ || row.run != run_ || row.position != position_, row.held_out};
         if (seen.begins) {
             // The times of the file may go on from dwell to dwell; that they do is known at its
             // end.
@@ -102,11 +103,19 @@ class RowsSeen {
     double last_s_ = 0;
 };
 
+/// Throws where the method fits what is held out.
+void hold_out(bool held_out, const estimator::Settings& settings) {
+    if (held_out && settings.method != estimator::Method::joint)
+        throw std::runtime_error(
+            "role: found \"verify\" with estimator.method \"two-step\", which fits all dwells, "
+            "expected \"joint\"");
+}
+
 /// Through the filter, with room for more dwells as they come.
 class RowsIdentified {
   public:
     explicit RowsIdentified(const estimator::Settings& settings)
-        : identification_(settings, room_) {}
+        : settings_(settings), identification_(settings, room_) {}
 
     void add(const RowsSeen::Row& row) {
         if (row.begins) begin_dwell(row);
@@ -116,7 +125,10 @@ class RowsIdentified {
         if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
         auto result = identification_.result();
         for (auto& row : result.rows) row.common_clock = seen.common_clock();
-        return with_doubts(std::move(result), identification_.rows(), seen.doubts());
+        Found found = with_doubts(std::move(result), identification_.rows(), seen.doubts());
+        for (const estimator::DwellRow& row : identification_.rows())
+            if (row.held_out) found.kept_out.push_back({row, {}});
+        return found;
     }
 
   private:
@@ -125,9 +137,12 @@ class RowsIdentified {
         if (++dwells_ > room_) identification_.reserve(room_ *= 2);
         estimator::DwellInfo info{row.run, row.position};
         info.begin_s = 0;
+        info.held_out = row.held_out;
+        hold_out(row.held_out, settings_);
         identification_.begin_dwell(info);
     }
 
+    const estimator::Settings& settings_;
     std::size_t room_ = 1024, dwells_ = 0;
     estimator::Identification identification_;
 };
@@ -171,8 +186,13 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
     const RecordingRow any;
     kinds.add({&any}, {}, path);
     found.kinds = kinds.kinds();
+    const auto kind_of = [&kinds](const estimator::DwellRow& row) {
+        return row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt;
+    };
     for (const estimator::DwellRow& row : found.result.rows)
-        found.spectral.push_back({row, row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt, 0});
+        found.spectral.push_back({row, kind_of(row), 0});
+    for (auto& [row, kind] : found.kept_out)
+        if (const auto known = kind_of(row)) kind = found.kinds[*known];
     return found;
 }
 
@@ -304,6 +324,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
         info.held_out = dwell.rows.front()->held_out;
+        hold_out(info.held_out, settings);
         info.random = kinds.random(d);
         const bool random = info.random.mean_square_g2 > 0;
         if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();

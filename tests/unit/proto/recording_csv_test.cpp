@@ -296,10 +296,10 @@ TEST_F(Recording, BeginsANewDwellWhereAPairComesBack) {
 
 TEST_F(Recording, RefusesADwellThatIsThereTwice) {
     // GIVEN two dwells of 100 rows, the second with times that begin anew
-    const auto dwell = [](int position, double noise, std::size_t rows) {
+    const auto dwell = [](int position, double noise, std::size_t rows, double from_s = 0) {
         std::string text;
         for (std::size_t i = 0; i < rows; ++i)
-            text += std::to_string(0.025 * static_cast<double>(i)) + ",1," +
+            text += std::to_string(from_s + 0.025 * static_cast<double>(i)) + ",1," +
                     std::to_string(position) + ",0,0,0," +
                     std::to_string(noise * std::sin(static_cast<double>(i))) + ",1,0\n";
         return text;
@@ -308,16 +308,37 @@ TEST_F(Recording, RefusesADwellThatIsThereTwice) {
     EXPECT_EQ(read(two).size(), 200U);
     // WHEN the first comes again, cut short, or under another position, THEN both are named
     EXPECT_EQ(error(two + dwell(1, 0.1, 60)),
-              ":202: found run 1, position 1 with the times and samples of the dwell of line 2, "
+              ":202: found run 1, position 1 with the samples of the dwell of line 2, "
               "expected each dwell once");
     EXPECT_EQ(error(two + dwell(3, 0.2, 100)),
-              ":202: found run 1, position 3 with the times and samples of the dwell of line 102, "
+              ":202: found run 1, position 3 with the samples of the dwell of line 102, "
               "expected each dwell once");
+    // Moved in time it is one all the same.
+    EXPECT_EQ(error(two + dwell(3, 0.2, 100, 1e4)),
+              ":202: found run 1, position 3 with the samples of the dwell of line 102, expected "
+              "each dwell once");
     // Other noise at the same times is another dwell.
     EXPECT_EQ(read(two + dwell(1, 0.11, 100)).size(), 300U);
     // Of instruments too coarse for their noise one dwell is like another, whatever was measured.
     const std::string coarse = dwell(1, 0, 100);
     EXPECT_EQ(read(kHeader + coarse + dwell(2, 0.2, 100) + coarse).size(), 300U);
+}
+
+TEST_F(Recording, KnowsTwoRolesAndOneForADwell) {
+    const std::string header =
+        "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g,role\n";
+    const auto rows = read(header +
+                           "0,1,1,0,0,0,0,1,0,\n0,1,2,0,0,0,0,1,0,Verify\n"
+                           "0,1,3,0,0,0,0,1,0,identify\n");
+    ASSERT_EQ(rows.size(), 3U);
+    EXPECT_FALSE(rows[0].held_out);
+    EXPECT_TRUE(rows[1].held_out);
+    EXPECT_FALSE(rows[2].held_out);
+    EXPECT_EQ(error(header + "0,1,1,0,0,0,0,1,0,verfy\n"),
+              ":2: column role: found 'verfy', expected \"identify\" or \"verify\"");
+    EXPECT_EQ(error(header + "0,1,1,0,0,0,0,1,0,verify\n1,1,1,0,0,0,0,1,0,identify\n"),
+              ":3: column role: found another role within run 1, position 1, expected one for all "
+              "of a dwell");
 }
 
 TEST_F(Recording, ReadsOtherSeparatorsAndDecimalCommasWhereTheyAreUnambiguous) {

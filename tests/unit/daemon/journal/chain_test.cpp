@@ -314,6 +314,10 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
         fs::remove(path + kKeySuffix);
         SigningKey(path + kKeySuffix).keep();
     };
+    const auto other_with = [&](const std::string& table) {
+        fs::remove(path);
+        Database(path).execute(("CREATE TABLE " + table + " (id INTEGER)").c_str());
+    };
     const std::vector<Case> cases{
         {"gone", false, [&] { fs::remove(path); }, "is gone, with 34 entries"},
         {"gone with its head", false,
@@ -323,18 +327,8 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
          },
          "and so is its signed head; its key is there"},
         {"zero length", false, [&] { fs::resize_file(path, 0); }, "has length zero"},
-        {"another database", false,
-         [&] {
-             fs::remove(path);
-             Database(path).execute("CREATE TABLE event (id INTEGER)");
-         },
-         "found version 0"},
-        {"somebody else's database", false,
-         [&] {
-             fs::remove(path);
-             Database(path).execute("CREATE TABLE file (id INTEGER)");
-         },
-         "found version 0"},
+        {"another database", false, [&] { other_with("event"); }, "found version 0"},
+        {"somebody else's database", false, [&] { other_with("file"); }, "found version 0"},
         {"no database", false, [&] { std::ofstream(path) << std::string(9000, 'x'); },
          "is damaged: it does not begin as an SQLite file does"},
         {"halved", false, [&] { cut(path); },

@@ -88,6 +88,32 @@ TEST_F(Identify, FindsAllThirtyWithinFourSigma) {
                                  Not(HasSubstr("nan")), Not(HasSubstr("Not observable"))));
 }
 
+TEST_F(Identify, HoldsOutWhatIsToVerifyAtOneFrequencyToo) {
+    // GIVEN a recording at one frequency whose fourth dwell is to prove the result
+    record("--dwell 10");
+    std::istringstream recording(content_of(folder_ / "rec.csv"));
+    std::string text, line;
+    std::getline(recording, line);
+    const std::string head = line;
+    for (text = head + ",role\n"; std::getline(recording, line);) {
+        std::istringstream fields(line);
+        std::string time, run, position;
+        std::getline(std::getline(std::getline(fields, time, ','), run, ','), position, ',');
+        text += line + (run == "1" && position == "4" ? ",verify\n" : ",\n");
+    }
+    write("held.csv", text);
+    // WHEN it is identified
+    const Outcome outcome = vibrig("identify held.csv --json");
+    // THEN that dwell is no part of it
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+    EXPECT_EQ(Json::parse(outcome.out)["dwell_rates"].size(), 27U);
+    // and a method that would fit it says so
+    write("two.toml", "[estimator]\nmethod = \"two-step\"\n");
+    const Outcome two = vibrig("identify held.csv --config two.toml");
+    EXPECT_EQ(two.exit_code, 2);
+    EXPECT_THAT(two.error, HasSubstr("role: found \"verify\" with estimator.method"));
+}
+
 TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
     // GIVEN one amplitude only
     record("--dwell 20 --table-g 9");
