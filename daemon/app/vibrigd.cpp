@@ -210,6 +210,30 @@ std::array<Print, 6> prints() {
               [] { return vibrig::serve::openapi_json() + "\n"; }}}};
 }
 
+/// Exit code of what only prints: nobody may take half of it, or nothing, for all.
+int printed() {
+    if (std::cout.flush()) return 0;
+    std::cerr << "vibrigd: standard output: cannot be written\n";
+    return 2;
+}
+
+/// --check: the effective configuration, and what can be said of its campaign.
+int print_check(const vibrig::configuration::Loaded& loaded) {
+    vibrig::check_bindings(loaded);
+    vibrig::check_results(loaded);
+    std::cout << vibrig::configuration::format_effective(loaded);
+    // As comments: what stands above reads back as a configuration.
+    const auto forecast = vibrig::forecast_campaign(loaded.configuration);
+    std::istringstream words(forecast.words);
+    for (std::string line; std::getline(words, line);) std::cout << "# " << line << '\n';
+    for (const std::string& line : vibrig::configuration::warnings(loaded))
+        std::cerr << "warning: " << line << '\n';
+    for (const std::string& line : vibrig::check_plan(loaded.configuration))
+        std::cerr << "warning: campaign: " << line << '\n';
+    insist(forecast);
+    return printed();
+}
+
 constexpr std::initializer_list<vibrig::proto::Exit> kExits{
     {0, "ended cleanly, rest measured; or what was asked for is printed"},
     {1, "ended without rest measured: the log says what moves"},
@@ -238,12 +262,12 @@ int main(int argc, char** argv) {
     vibrig::proto::refuse_empty_values(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(app, kExits);
-        return 0;
+        return printed();
     }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? printed() : 2;
     }
 
     // Blocked before any thread starts, so that sigwait in the main thread gets them all.
@@ -259,30 +283,12 @@ int main(int argc, char** argv) {
         vibrig::estimator::use_instruction_set(instruction_set);
         for (const Print& print : printable) {
             if (!print.asked) continue;
-            std::cout << print.words() << std::flush;
-            return std::cout ? 0 : 2;
+            std::cout << print.words();
+            return printed();
         }
         auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_certificates(loaded);
-        if (check) {
-            vibrig::check_bindings(loaded);
-            vibrig::check_results(loaded);
-            std::cout << vibrig::configuration::format_effective(loaded);
-            // As comments: what stands above reads back as a configuration.
-            const auto forecast = vibrig::forecast_campaign(loaded.configuration);
-            std::istringstream words(forecast.words);
-            for (std::string line; std::getline(words, line);) {
-                std::cout << "# " << line << '\n';
-            }
-            for (const std::string& line : vibrig::configuration::warnings(loaded)) {
-                std::cerr << "warning: " << line << '\n';
-            }
-            for (const std::string& line : vibrig::check_plan(loaded.configuration)) {
-                std::cerr << "warning: campaign: " << line << '\n';
-            }
-            insist(forecast);
-            return 0;
-        }
+        if (check) return print_check(loaded);
         const auto& file = loaded.configuration.log_file;
         const int descriptor = file.empty() ? STDERR_FILENO : vibrig::log::open_log_file(file);
         vibrig::log::LogQueue log(descriptor);

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "daemon/archive/manifest.hpp"
@@ -99,6 +100,34 @@ class DeliveryLock {
     Descriptor file_;
 };
 
+/// Held by everyone who delivers, so that whoever finds nobody else at it may remove what those who
+/// were killed left.
+class Underway {
+  public:
+    explicit Underway(const fs::path& incoming) : file_(path_in(incoming), flags(incoming)) {
+        if (::flock(file_.number(), LOCK_EX | LOCK_NB) == 0) clear(incoming);
+        while (::flock(file_.number(), LOCK_SH) != 0)
+            if (errno != EINTR) fail(path_in(incoming), "lock it");
+    }
+
+  private:
+    /// No rig's: their names do not begin so.
+    static fs::path path_in(const fs::path& incoming) { return incoming / ".underway"; }
+    /// Of somebody else it can be locked, too.
+    static int flags(const fs::path& incoming) {
+        std::error_code none;
+        const fs::path path = path_in(incoming);
+        const bool theirs = fs::exists(path, none) && ::access(path.c_str(), W_OK) != 0;
+        return theirs ? O_RDONLY : O_RDWR | O_CREAT;
+    }
+    static void clear(const fs::path& incoming) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(incoming, none))
+            if (fs::is_directory(entry.symlink_status(none))) fs::remove_all(entry.path(), none);
+    }
+    Descriptor file_;
+};
+
 /// A name that is one folder below another, whatever a configuration says.
 std::string as_name(std::string text) {
     std::ranges::replace(text, '/', '_');
@@ -107,6 +136,7 @@ std::string as_name(std::string text) {
 
 void stage(const std::string& source, const fs::path& incoming, const Entry& entry,
            const Progress& progress) {
+    const std::string manifest = manifest_json(entry, source);
     fs::remove_all(incoming);
     fs::create_directories(incoming);
     std::size_t all = 0, done = 0;
@@ -118,7 +148,6 @@ void stage(const std::string& source, const fs::path& incoming, const Entry& ent
         });
     if (const auto wrong = differences(incoming.string(), entry.files); !wrong.empty())
         throw ArchiveError("the copy is not what was copied: " + wrong.front());
-    const std::string manifest = manifest_json(entry);
     const Descriptor file(incoming / kManifestName, O_WRONLY | O_CREAT | O_TRUNC);
     write_all(file, incoming / kManifestName, manifest.data(), manifest.size());
     file.sync();
@@ -126,8 +155,7 @@ void stage(const std::string& source, const fs::path& incoming, const Entry& ent
 }
 
 bool is_that(const fs::path& folder, const Entry& entry) {
-    return fs::exists(folder / kManifestName) &&
-           campaign_hash(list_files(folder.string())) == entry.hash;
+    return campaign_hash(list_files(folder.string())) == entry.hash;
 }
 
 /// `incoming` becomes `target`; what is damaged there makes room.
@@ -149,24 +177,117 @@ std::string host_name() {
     return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "rig";
 }
 
-std::vector<std::string> campaign_folders(const std::string& folder) {
+std::vector<std::string> campaign_folders(const std::string& folder, const Strange& strange) {
     if (!fs::is_directory(folder))
         throw ArchiveError(folder + ": found no such folder, expected a campaign's or one of them");
     if (!record::part_files(folder).empty()) return {folder};
     std::vector<std::string> found;
+    const auto look = [&](const fs::directory_entry& entry) {
+        std::error_code error;
+        const bool is_folder = entry.is_directory(error);
+        // A link to nowhere says so, too.
+        if (error && error != std::errc::no_such_file_or_directory)
+            strange(entry.path().string(), error.message());
+        if (!is_folder || entry.path().filename().string().starts_with('.')) return false;
+        if (record::part_files(entry.path().string()).empty()) return true;
+        found.push_back(entry.path().string());
+        return false;
+    };
     for (const auto& entry : fs::directory_iterator(folder)) {
-        if (!entry.is_directory() || entry.path().filename().string().starts_with('.')) continue;
-        if (!record::part_files(entry.path().string()).empty()) {
-            found.push_back(entry.path().string());
-            continue;
-        }
-        for (const auto& below : fs::directory_iterator(entry.path()))
-            if (below.is_directory() && !record::part_files(below.path().string()).empty())
-                found.push_back(below.path().string());
+        if (!look(entry)) continue;
+        std::error_code error;
+        fs::directory_iterator below(entry.path(), error);
+        if (error) strange(entry.path().string(), error.message());
+        for (const auto& one : below) look(one);
     }
     std::ranges::sort(found);
     return found;
 }
+
+namespace {
+
+/// The same recording as the index has it, of whichever rig; nothing: it has none, or the folder is
+/// gone.
+std::optional<Entry> known_in(const Place& place, const fs::path& root, const std::string& hash) {
+    std::error_code none;
+    // Nothing is made before the campaign is there.
+    if (!is_server(place.index) && !fs::exists(place.index, none)) return {};
+    Index index(place.index, Database::Mode::write);
+    const auto key = index.key_of(hash);
+    if (!key || !fs::is_directory(root / *key, none)) return {};
+    return index.campaign(*key);
+}
+
+/// Into the archive, where it is not there.
+void bring(const fs::path& own, const fs::path& root, const Place& place, Delivery& delivery,
+           const Progress& progress) {
+    if (!fs::is_directory(root))
+        throw ArchiveError(root.string() + ": found no such folder, expected the archive's");
+    Entry& entry = delivery.entry;
+    const fs::path incoming_root = root / kIncoming;
+    fs::create_directories(incoming_root);
+    const Underway underway(incoming_root);
+    const auto known = known_in(place, root, entry.hash);
+    delivery.elsewhere = known && known->rig != entry.rig;
+    if (delivery.elsewhere) entry.rig = known->rig;
+    const DeliveryLock lock(incoming_root / (as_name(entry.rig) + ".lock"));
+    const std::string name = as_name(entry.key);
+    fs::path target = known ? root / known->key : root / entry.rig / name;
+    const bool there = fs::exists(target);
+    // Of another time: the campaign went on, or another rig has this one's name.
+    if (!known && there && origin_in(target.string()).hash != entry.hash)
+        target += "~" + entry.hash.substr(0, 8);
+    entry.key = known ? known->key : entry.rig + "/" + target.filename().string();
+    delivery.folder = target.string();
+    // Of one that was registered where it lay there is no manifest.
+    if ((known || fs::exists(target / kManifestName)) && fs::exists(target) &&
+        is_that(target, entry)) {
+        delivery.kind = Delivery::Kind::was_there;
+        return;
+    }
+    delivery.kind = fs::exists(target) ? Delivery::Kind::mended : Delivery::Kind::copied;
+    const fs::path incoming =
+        incoming_root / (as_name(entry.rig) + "-" + name + "-" + entry.hash.substr(0, 8));
+    try {
+        stage(own.string(), incoming, entry, progress);
+    } catch (...) {
+        std::error_code none;
+        fs::remove_all(incoming, none);
+        throw;
+    }
+    fs::create_directories(target.parent_path());
+    show(incoming, target);
+}
+
+/// Into the index, where the same recording under another name is the same campaign.
+void note(const Place& place, const fs::path& root, bool inside, Delivery& delivery) {
+    Entry& entry = delivery.entry;
+    Index index(place.index, Database::Mode::write);
+    const auto of_another = [&] {
+        auto known = index.key_of(entry.hash);
+        return known && *known != entry.key ? known : std::nullopt;
+    };
+    auto known = of_another();
+    if (known && !inside && !fs::exists(root / *known)) {
+        index.forget(*known);
+        known.reset();
+    }
+    try {
+        if (!known) return index.put(entry, true);
+    } catch (const ArchiveError&) {
+        known = of_another();
+        if (!known) throw;
+    }
+    // Another rig was faster: one of them is enough.
+    std::error_code none;
+    if (delivery.kind == Delivery::Kind::copied) fs::remove_all(delivery.folder, none);
+    if (const auto there = index.campaign(*known)) entry.rig = there->rig;
+    entry.key = *known;
+    delivery.kind = Delivery::Kind::was_there;
+    delivery.elsewhere = true;
+}
+
+}  // namespace
 
 Delivery deliver(const std::string& campaign_folder, const Place& place, const std::string& rig,
                  const Progress& progress) {
@@ -186,40 +307,9 @@ Delivery deliver(const std::string& campaign_folder, const Place& place, const s
         delivery.kind = Delivery::Kind::was_there;
         delivery.folder = own.string();
     } else {
-        if (!fs::is_directory(root))
-            throw ArchiveError(root.string() + ": found no such folder, expected the archive's");
-        const fs::path incoming_root = root / kIncoming;
-        fs::create_directories(incoming_root);
-        const DeliveryLock lock(incoming_root / (entry.rig + ".lock"));
-        const std::string name = as_name(entry.key);
-        fs::path target = root / entry.rig / name;
-        const bool taken = fs::exists(target);
-        // Of another time: the campaign went on, or another rig has this one's name.
-        if (taken && origin_in(target.string()).hash != entry.hash)
-            target += "~" + entry.hash.substr(0, 8);
-        entry.key = entry.rig + "/" + target.filename().string();
-        delivery.folder = target.string();
-        if (is_that(target, entry)) {
-            delivery.kind = Delivery::Kind::was_there;
-        } else {
-            delivery.kind = fs::exists(target) ? Delivery::Kind::mended : Delivery::Kind::copied;
-            const fs::path incoming =
-                incoming_root / (entry.rig + "-" + name + "-" + entry.hash.substr(0, 8));
-            stage(own.string(), incoming, entry, progress);
-            fs::create_directories(target.parent_path());
-            show(incoming, target);
-        }
+        bring(own, root, place, delivery, progress);
     }
-    Index index(place.index, Database::Mode::write);
-    // The same recording under another name is the same campaign.
-    if (const auto known = index.key_of(entry.hash); known && *known != entry.key) {
-        if (inside || fs::exists(root / *known)) {
-            entry.key = *known;
-            return delivery;
-        }
-        index.forget(*known);
-    }
-    index.put(entry, true);
+    note(place, root, inside, delivery);
     return delivery;
 }
 

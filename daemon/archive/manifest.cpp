@@ -21,13 +21,29 @@ bool of_the_recording(const std::string& name) {
            (name.starts_with("campaign") && name.ends_with(".h5"));
 }
 
+/// Else JSON does not take it.
+bool is_utf8(const nlohmann::ordered_json& text) {
+    try {
+        static_cast<void>(text.dump());
+        return true;
+    } catch (const nlohmann::json::exception&) {
+        return false;
+    }
+}
+
+std::string shown_name(const nlohmann::json& name) {
+    return name.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace
 
 std::vector<File> list_files(const std::string& folder) {
     std::vector<File> files;
     for (const auto& entry : fs::directory_iterator(folder)) {
         const std::string name = entry.path().filename().string();
-        if (!entry.is_regular_file() || name == kManifestName || name.ends_with(".new")) continue;
+        std::error_code error;  // of a link that leads round in a circle: it is no file
+        if (!entry.is_regular_file(error) || name == kManifestName || name.ends_with(".new"))
+            continue;
         files.push_back({name, static_cast<std::int64_t>(entry.file_size()),
                          record::sha256_of_file(entry.path().string())});
     }
@@ -42,23 +58,29 @@ std::string campaign_hash(const std::vector<File>& files) {
     return record::sha256_of_text(text);
 }
 
-std::string manifest_json(const Entry& entry) {
+std::string manifest_json(const Entry& entry, const std::string& source) {
     nlohmann::ordered_json files = nlohmann::ordered_json::array();
     for (const File& file : entry.files)
         files.push_back({{"name", file.name}, {"bytes", file.bytes}, {"sha256", file.sha256}});
-    return nlohmann::ordered_json{{"hash", entry.hash},
-                                  {"rig", entry.rig},
-                                  {"key", entry.key},
-                                  {"files", std::move(files)}}
-               .dump(2) +
-           "\n";
+    const nlohmann::ordered_json manifest{
+        {"hash", entry.hash}, {"rig", entry.rig}, {"key", entry.key}, {"files", std::move(files)}};
+    if (is_utf8(manifest)) return manifest.dump(2) + "\n";
+    for (const File& file : entry.files)
+        if (!is_utf8(file.name))
+            throw ArchiveError(source + ": found a file " + shown_name(file.name) +
+                               ", expected a name in UTF-8");
+    throw ArchiveError(source + ": found the campaign " + shown_name(entry.key) + " of the rig " +
+                       shown_name(entry.rig) + ", expected names in UTF-8");
 }
 
 Origin origin_in(const std::string& folder) {
     std::ifstream file(fs::path(folder) / kManifestName);
     const auto root = nlohmann::json::parse(file, nullptr, false);
-    if (!root.is_object()) return {};
-    return {root.value("rig", ""), root.value("hash", "")};
+    try {
+        if (root.is_object()) return {root.value("rig", ""), root.value("hash", "")};
+    } catch (const nlohmann::json::exception&) {  // somebody else's
+    }
+    return {};
 }
 
 std::vector<std::string> differences(const std::string& folder, const std::vector<File>& expected) {

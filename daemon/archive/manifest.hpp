@@ -14,7 +14,8 @@ inline constexpr const char* kManifestName = "archive.json";
 [[nodiscard]] std::vector<File> list_files(const std::string& folder);
 /// Hash of the recording itself: what programs write beside it later does not change it.
 [[nodiscard]] std::string campaign_hash(const std::vector<File>& files);
-[[nodiscard]] std::string manifest_json(const Entry& entry);
+/// Throws ArchiveError that names `source` where a name is not UTF-8.
+[[nodiscard]] std::string manifest_json(const Entry& entry, const std::string& source);
 /// What a folder's manifest says; empty without one.
 struct Origin {
     std::string rig, hash;

@@ -16,8 +16,11 @@ namespace {
 /// The files as the index has them, and as the manifest beside them has.
 void check_copy(const Entry& entry, std::vector<File> files, const fs::path& folder, bool quick,
                 Verified& to) {
-    if (!fs::exists(folder)) {
-        to.findings.push_back({"missing", entry.key, folder.string() + ": no such folder"});
+    std::error_code error;
+    if (!fs::exists(folder, error)) {
+        to.findings.push_back(
+            {"missing", entry.key,
+             folder.string() + ": " + (error ? error.message() : std::string("no such folder"))});
         return;
     }
     to.files += files.size();
@@ -31,10 +34,30 @@ void check_copy(const Entry& entry, std::vector<File> files, const fs::path& fol
         to.findings.push_back({"damaged", entry.key, std::move(words)});
 }
 
+/// What is named, and passed by.
+Strange strange_in(const fs::path& folder, Verified& to) {
+    return [folder, &to](const std::string& path, const std::string& why) {
+        to.findings.push_back({"does not belong there",
+                               fs::path(path).lexically_relative(folder).string(),
+                               path + ": cannot be looked at: " + why});
+    };
+}
+
+/// A campaign's folder that the index does not have: what it is, and what to do.
+std::string unregistered(const std::string& folder, const Place& place, Index& index) {
+    const auto known = index.key_of(origin_in(folder).hash);
+    std::error_code none;
+    if (known && fs::exists(fs::path(place.folder) / *known, none))
+        return folder + ": is in the archive's folder and the same campaign as " + *known +
+               ", which the index has: this one may be removed";
+    return folder + ": is in the archive's folder and not in its index: vibrig archive add " +
+           folder;
+}
+
 void check_rig(const Place& place, const std::string& recordings, const std::string& rig,
                Index& index, const std::vector<Entry>& entries, Verified& to) {
     std::set<std::string> hashes;
-    for (const auto& folder : campaign_folders(recordings)) {
+    for (const auto& folder : campaign_folders(recordings, strange_in(recordings, to))) {
         const std::string name = fs::path(folder).filename().string();
         const auto parts = record::part_files(folder);
         if (record::WriterLock::held(parts.rbegin()->second)) continue;  // the one in progress
@@ -78,14 +101,10 @@ Verified verify(const Place& place, const std::string& recordings, const std::st
                 {"not in the index", entry.key,
                  "its result is not read: vibrig archive add " + place.folder + "/" + entry.key});
     }
-    for (const auto& folder : campaign_folders(place.folder)) {
+    for (const auto& folder : campaign_folders(place.folder, strange_in(place.folder, found))) {
         const std::string key = fs::path(folder).lexically_relative(place.folder).string();
         if (!keys.contains(key))
-            found.findings.push_back({"not in the index", key,
-                                      folder +
-                                          ": is in the archive's folder and not in its index: "
-                                          "vibrig archive add " +
-                                          folder});
+            found.findings.push_back({"not in the index", key, unregistered(folder, place, index)});
     }
     if (!recordings.empty()) check_rig(place, recordings, rig, index, entries, found);
     return found;

@@ -1,6 +1,7 @@
 #include "daemon/record/index.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -83,13 +84,25 @@ IndexedFile look_at_raw(const std::string& path) {
     return file;
 }
 
+/// SQLite writes beside it, too.
+bool may_write(const std::string& folder) {
+    return ::access((folder + "/").c_str(), W_OK) == 0 &&
+           ::access(Index::path_in(folder).c_str(), W_OK) == 0;
+}
+
 }  // namespace
 
 std::string Index::path_in(const std::string& folder) { return folder + "/recordings.sqlite3"; }
 
-Index::Index(std::string folder, const Tell& tell) : folder_(std::move(folder)), tell_(tell) {
+Index::Index(std::string folder, const Tell& tell, Use use)
+    : folder_(std::move(folder)), tell_(tell), only_read_(use == Use::ask && !may_write(folder_)) {
+    std::error_code none;
+    const bool empty = fs::file_size(path_in(folder_), none) == 0;  // nor an error
     or_make_anew([this] { open(); });
     static_cast<void>(ask("SELECT name FROM file LIMIT 1"));
+    if (!empty) return;  // not taken away first: somebody may just be making it
+    tell_(path_in(folder_) +
+          fmt::format(": is empty: made anew from the files of {} campaigns", rebuild()));
 }
 
 bool Index::or_make_anew(const std::function<void()>& act) {
@@ -97,7 +110,7 @@ bool Index::or_make_anew(const std::function<void()>& act) {
         act();
         return true;
     } catch (const DatabaseError& error) {
-        if (!error.damaged()) throw;
+        if (!error.damaged() || only_read_) throw;
         make_anew(error.what());
         return false;
     }
@@ -123,9 +136,10 @@ Index::~Index() = default;
 
 void Index::open() {
     journal::refuse_foreign(path_in(folder_), {"file", "index_version"});
-    database_ = std::make_unique<Database>(path_in(folder_));
-    // It can be made anew: no waiting for the disk.
-    database_->execute("PRAGMA synchronous = OFF");
+    using Mode = Database::Mode;
+    database_ = std::make_unique<Database>(path_in(folder_), only_read_ ? Mode::read : Mode::write);
+    if (only_read_) return;
+    database_->execute("PRAGMA synchronous = OFF");  // it can be made anew: no waiting
     database_->execute(kTables);
 }
 
@@ -272,7 +286,7 @@ Known seen_in(const std::string& folder, const std::string& argument) {
 
 Known known_in(const std::string& folder, const std::string& argument, const Index::Tell& tell) {
     try {
-        Index index(folder, tell);
+        Index index(folder, tell, Index::Use::ask);
         Known known{index.look_up(argument), {}, 0};
         if (!known.named.is_key && known.named.keys.empty())
             std::tie(known.keys, known.count) = index.some_keys(kMostNamed);
@@ -322,7 +336,7 @@ std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
     const std::string beside = folder.parent_path().string();
     if (error || !fs::exists(Index::path_in(beside), error)) return {};
     try {
-        return Index(beside, tell).files_of(base_name(folder));
+        return Index(beside, tell, Index::Use::ask).files_of(base_name(folder));
     } catch (const std::exception&) {
         // Of somebody else: nothing to compare with.
     }

@@ -38,8 +38,10 @@ struct IndexedCampaign {
 class Index {
   public:
     using Tell = std::function<void(const std::string& words)>;
-    /// Opens or makes it; a damaged one is made anew, and reported.
-    Index(std::string folder, const Tell& tell);
+    enum class Use : std::uint8_t { write, ask };
+    /// Opens or makes it; a damaged one is made anew, and reported. To ask one that may not be
+    /// written, the right to read is enough.
+    Index(std::string folder, const Tell& tell, Use use = Use::write);
     ~Index();
 
     /// Looks at a campaign's folder, or at one file of it, and notes what there is.
@@ -76,6 +78,7 @@ class Index {
 
     std::string folder_;
     Tell tell_;
+    bool only_read_;
     std::unique_ptr<journal::Database> database_;
 };
 

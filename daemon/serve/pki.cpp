@@ -9,6 +9,7 @@
 #include <openssl/rand.h>
 #include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -83,16 +84,43 @@ bool is_address(const std::string& host) {
 std::string alternative_names(const std::vector<std::string>& hosts) {
     std::string names;
     for (const std::string& host : hosts) {
-        if (host.empty() || host.find_first_of(",: \t\n") != std::string::npos) {
-            if (!is_address(host))
-                throw PkiError("host: found '" + host + "', expected a name or an address");
-        }
+        if (!is_host(host))
+            throw PkiError("host: found '" + host + "', expected a name or an address");
         names += (names.empty() ? "" : ",") + std::string(is_address(host) ? "IP:" : "DNS:") + host;
     }
     return names;
 }
 
 }  // namespace
+
+bool is_host(const std::string& text) {
+    constexpr std::size_t kHostName = 253;  // RFC 1035
+    // What openssl reads as a list, or as anything but a name, is none.
+    const auto fits = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '_' || c == '.' || c == '*';
+    };
+    return is_address(text) ||
+           (!text.empty() && text.size() <= kHostName && text.front() != '.' &&
+            text.find("..") == std::string::npos && std::all_of(text.begin(), text.end(), fits));
+}
+
+std::string unfit_for(const std::vector<std::string>& hosts, const std::string& certificate,
+                      const std::string& authority) {
+    const Certificate server = certificate_of(certificate);
+    const Certificate issuer = certificate_of(authority);
+    if (X509_verify(server.get(), X509_get0_pubkey(issuer.get())) != 1)
+        return "comes from another authority";
+    if (X509_cmp_current_time(X509_get0_notAfter(server.get())) < 0) return "has ended";
+    for (const std::string& host : hosts) {
+        const bool named = is_address(host)
+                               ? X509_check_ip_asc(server.get(), host.c_str(), 0) == 1
+                               : X509_check_host(server.get(), host.c_str(), host.size(),
+                                                 X509_CHECK_FLAG_NEVER_CHECK_SUBJECT, nullptr) == 1;
+        if (!named) return "does not name \"" + host + '"';
+    }
+    return {};
+}
 
 Identity make_identity(const CertificateSettings& settings, const Identity* issuer) {
     using Use = CertificateSettings::Use;

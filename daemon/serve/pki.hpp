@@ -27,6 +27,12 @@ struct Identity {
     std::string certificate, key;
 };
 
+/// A name as in the DNS (letters, digits, '-', '_', '.', a '*' for a part) or a numeric address.
+[[nodiscard]] bool is_host(const std::string& text);
+/// Why a server's certificate does not do for these hosts: it names not all of them, has ended, or
+/// comes from another authority. Empty: it does. Throws PkiError where it cannot be read.
+[[nodiscard]] std::string unfit_for(const std::vector<std::string>& hosts,
+                                    const std::string& certificate, const std::string& authority);
 /// Signed by the issuer; by itself without one. Throws PkiError.
 [[nodiscard]] Identity make_identity(const CertificateSettings& settings,
                                      const Identity* issuer = nullptr);

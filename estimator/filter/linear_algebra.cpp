@@ -1,9 +1,24 @@
 #include "estimator/filter/linear_algebra.hpp"
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <limits>
+#include <stdexcept>
 
 namespace vibrig::estimator::linear_algebra {
+
+namespace {
+
+/// Eigen picks the largest column by its norm: of one that is no number it reads out of bounds.
+Eigen::ColPivHouseholderQR<Matrix> pivoted(MatrixIn a) {
+    if (!std::isfinite(a.squaredNorm()))
+        throw std::domain_error(
+            "found a matrix with an element that is not finite, or too large to be squared, "
+            "expected finite ones");
+    return Eigen::ColPivHouseholderQR<Matrix>(a);
+}
+
+}  // namespace
 
 SymmetricEigen symmetric_eigen(MatrixIn a) {
     const Eigen::SelfAdjointEigenSolver<Matrix> solver(a);
@@ -16,7 +31,7 @@ Vector symmetric_eigenvalues(MatrixIn a) {
 
 RightSingular right_singular(MatrixIn a) {
     // A P = Q R: the triangle has A's singular values, and P turns its right vectors into A's.
-    const Eigen::ColPivHouseholderQR<Matrix> qr(a);
+    const auto qr = pivoted(a);
     const Matrix r = qr.matrixQR().topRows(a.cols()).triangularView<Eigen::Upper>();
     const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(r, Eigen::ComputeFullV);
     return {svd.singularValues(), qr.colsPermutation() * svd.matrixV()};
@@ -87,17 +102,15 @@ double LowerUpper::log_det() const {
     return factor_->of.matrixLU().diagonal().array().abs().log().sum();
 }
 
-Matrix orthogonal_factor(MatrixIn a) {
-    return Eigen::ColPivHouseholderQR<Matrix>(a).householderQ();
-}
+Matrix orthogonal_factor(MatrixIn a) { return pivoted(a).householderQ(); }
 
 Matrix least_squares(MatrixIn a, MatrixIn b) {
-    return Eigen::ColPivHouseholderQR<Matrix>(a).solve(b);
+    if (!b.allFinite())
+        throw std::domain_error("found a right side that is not finite, expected finite elements");
+    return pivoted(a).solve(b);
 }
 
-Eigen::Index rank(MatrixIn a, double least) {
-    return Eigen::ColPivHouseholderQR<Matrix>(a).setThreshold(least).rank();
-}
+Eigen::Index rank(MatrixIn a, double least) { return pivoted(a).setThreshold(least).rank(); }
 
 Matrix product(MatrixIn a, MatrixIn b) { return a * b; }
 

@@ -13,7 +13,9 @@ using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 
 /// Factorisations of dense matrices of any size, compiled once: Eigen's templates take seconds in
 /// every file that instantiates them. They allocate; not for the path of a sample, but for the two
-/// of fixed size. Nothing is thrown; what cannot be factorised is reported as said.
+/// of fixed size. What cannot be factorised is reported as said; those with pivoted columns
+/// (right_singular, orthogonal_factor, least_squares, rank) throw std::domain_error for elements
+/// that are not finite or whose squares are not.
 namespace vibrig::estimator::linear_algebra {
 
 using Matrix = Eigen::MatrixXd;

@@ -1,7 +1,9 @@
 #include "estimator/plan/calibration.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <unsupported/Eigen/SpecialFunctions>
@@ -19,6 +21,18 @@ constexpr double kMustFit = 1e-6;
 
 bool stated(const std::vector<Reading>& readings) { return readings.front().sigma > 0; }
 
+std::string short_number(double value) {
+    std::array<char, 40> out{};
+    std::snprintf(out.data(), out.size(), "%g", value);
+    return out.data();
+}
+
+void check_size(const std::string& place, double value, double largest) {
+    if (std::abs(value) <= largest) return;
+    throw PlanError(place + ": found " + short_number(value) + ", expected a number from " +
+                    short_number(-largest) + " to " + short_number(largest));
+}
+
 void check(const std::vector<Reading>& readings, const Terms& terms) {
     const auto needed = static_cast<std::size_t>(std::count(terms.begin(), terms.end(), true));
     if (needed == 0) throw PlanError("found a model without terms, expected one at least");
@@ -29,14 +43,28 @@ void check(const std::vector<Reading>& readings, const Terms& terms) {
     for (std::size_t i = 0; i < readings.size(); ++i) {
         const Reading& r = readings[i];
         const std::string place = "reading " + std::to_string(i + 1) + ": ";
-        const bool finite = std::isfinite(r.output) && std::isfinite(r.input[0]) &&
-                            std::isfinite(r.input[1]) && std::isfinite(r.input[2]);
-        if (!finite) throw PlanError(place + "found a value that is not finite, expected numbers");
+        check_size(place + "input", r.input[0], kLargestInput);
+        check_size(place + "input", r.input[1], kLargestInput);
+        check_size(place + "input", r.input[2], kLargestInput);
+        check_size(place + "output", r.output, kLargestOutput);
         if (!(r.sigma >= 0) || !std::isfinite(r.sigma) || (r.sigma > 0) != stated(readings)) {
             throw PlanError(place + "found sigma " + std::to_string(r.sigma) +
                             ", expected all of them above 0, or none");
         }
+        // A mean has less than each of its readings.
+        if (r.sigma > 0 && !(r.sigma >= kSmallestSigma / std::sqrt(kMostMeant)))
+            throw PlanError(place + "found sigma " + short_number(r.sigma) + ", expected " +
+                            short_number(kSmallestSigma) + " or more");
+        if (!(r.sigma <= kLargestSigma))
+            throw PlanError(place + "found sigma " + short_number(r.sigma) + ", expected " +
+                            short_number(kLargestSigma) + " or less");
     }
+}
+
+/// Columns are divided by the largest: there has to be one.
+void check_excited(const Problem& problem) {
+    if (rows(problem.points, problem.terms).squaredNorm() > 0) return;
+    throw PlanError("found inputs of 0 alone, expected some that excite a term of the model");
 }
 
 /// P(chi-square > x).
@@ -92,6 +120,7 @@ SensorCalibration calibrate(const std::vector<Reading>& readings, const Terms& t
         problem.points.push_back({turntable_row(readings[i].input), sigma, 1});
         y[at(i)] = readings[i].output / sigma;
     }
+    check_excited(problem);
     SensorCalibration out;
     out.plan = evaluate(problem, Effort(readings.size(), 1.0));
     Vector scale;

@@ -8,6 +8,12 @@
 
 namespace vibrig::estimator::plan {
 
+/// Largest input and output, and range of sigmas, in any unit that a sensor has. Their squares and
+/// quotients are squared on the way, which has to stay far from what a double can hold.
+inline constexpr double kLargestInput = 1e12, kLargestOutput = 1e30;
+inline constexpr double kSmallestSigma = 1e-30, kLargestSigma = 1e30;
+inline constexpr double kMostMeant = 1e12;  ///< readings that one is the mean of
+
 /// One reading of a turntable or centrifuge test.
 struct Reading {
     Vec3 input{};  ///< on input, output and spin axis; the input's unit, for instance g or deg/s
@@ -39,7 +45,8 @@ struct SensorCalibration {
 /// Weighted by 1 / sigma^2. With stated sigmas the sum of squared residuals over sigma^2 follows
 /// chi-square(degrees); without, readings repeated at one input tell the noise apart from lack of
 /// fit: F of the two. Throws PlanError for fewer readings than coefficients, an input, output or
-/// sigma that is not finite, and sigmas of which some but not all are 0.
+/// sigma beyond the limits above, sigmas of which some but not all are 0, and inputs that excite no
+/// term.
 [[nodiscard]] SensorCalibration calibrate(const std::vector<Reading>& readings,
                                           const Terms& terms = kAllTerms);
 

@@ -5,6 +5,8 @@ one is seen, and a measurement does not notice. The index in SQLite, and in a Po
 usage: archive.py PROGRAMS [--seed N] [--soak]
 """
 import concurrent.futures
+import contextlib
+import fcntl
 import glob
 import importlib.machinery
 import importlib.util
@@ -13,6 +15,7 @@ import os
 import random
 import shutil
 import signal
+import sqlite3
 import ssl
 import subprocess
 import sys
@@ -25,7 +28,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import recording_faults  # noqa: E402
 import rig as r  # noqa: E402
 import server_load  # noqa: E402
-from archive_parts import POSTGRES, Archive, Postgres, SickArchive, asked, clone, result_in, without_role  # noqa: E402
+from archive_parts import (POSTGRES, Archive, Postgres, SickArchive, asked, asked_by_nobody, clone, result_in,  # noqa: E402
+                           without_role)
 
 CAMPAIGN = {"name": "unit", "identify": "what-it-can", "dwell_s": 2.0}
 
@@ -392,6 +396,79 @@ def grows(checks, programs, folder):
                  f"vibrig list --json of 10 000: {many[0] / few[0]:.1f} times the processor time of 1000", f"{few}, {many}")
 
 
+def once(checks, programs, folder, base):
+    """The same recording is there once, whoever brings it; and nothing half stays."""
+    lab = Archive(programs, os.path.join(folder, "once"))
+    for rig in ("one", "two"):
+        run = lab.add(base, rig)
+        checks.check(run.returncode == 0, f"a campaign is added for rig {rig}", run.stderr)
+    checks.check("of rig 'one', nothing was copied" in run.stdout and not os.path.exists(os.path.join(lab.folder, "two")),
+                 "the second time it says under which rig it is there", run.stdout)
+    checks.equal(lab.verify(), [], "and the archive is whole")
+    there = glob.glob(os.path.join(lab.folder, "one", "*", "campaign.h5"))[0]
+    os.truncate(there, 1000)
+    run = lab.add(base, "two")
+    checks.check(run.returncode == 0 and "mended, one/" in run.stdout and lab.verify() == [], "damaged, it is mended where it is", run.stdout)
+    for name in (b"\xff", "a\nb", "x" * 65):
+        run = lab.add(base, name)
+        checks.check(run.returncode == 2 and run.stderr.count("\n") == 1 and "--rig: found '" in run.stderr, "a rig has no such name",
+                     run.stderr)
+    left = os.path.join(lab.folder, ".incoming", "one-left-0")
+    os.mkdir(left)
+    with open(os.path.join(lab.folder, ".incoming", ".underway"), "rb") as other:
+        fcntl.flock(other, fcntl.LOCK_SH)
+        checks.check(lab.add(base, "one").returncode == 0 and lab.incoming() == [left], "what another add is at stays")
+    checks.check(lab.add(base, "one").returncode == 0 and lab.incoming() == [], "what one left that was killed does not")
+    for where in ("loop", "one/loop", os.path.relpath(os.path.dirname(there), lab.folder) + "/loop"):
+        os.symlink("loop", os.path.join(lab.folder, where))
+    checks.equal(sorted((f["what"], f["campaign"]) for f in lab.verify()),
+                 [("does not belong there", "loop"), ("does not belong there", "one/loop")], "links in a circle are named and passed by")
+    for port in ("99999", "65536", "-1", "x", ""):
+        run = subprocess.run([lab.program, "archive", "serve", *lab.where(), "--page", "127.0.0.1:" + port], capture_output=True, text=True,
+                             timeout=20)
+        checks.check(run.returncode == 2 and "from 0 to 65535" in run.stderr, f"'{port}' is no port", run.stderr)
+
+
+def only_read(checks, programs, folder, results, serial):
+    """A rig's recordings, asked by somebody who may only read them, while a recorder has the index and after it; and an index that is
+    damaged."""
+    rec = Archive(programs, os.path.join(folder, "read"))
+    shutil.copytree(results, rec.folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("journal*", "*.sqlite3*", ".outbox"))
+    subprocess.run(["chmod", "-R", "u=rwX,go=rX", rec.folder], check=True)
+    index = os.path.join(rec.folder, "recordings.sqlite3")
+    campaigns = [os.path.basename(os.path.dirname(path)) for path in glob.glob(os.path.join(rec.folder, "*", "campaign.h5"))]
+    # As the recorder makes it: its own tables alone, and a log.
+    with contextlib.closing(sqlite3.connect(index)) as recorder:
+        recorder.execute("PRAGMA journal_mode = WAL")
+        recorder.execute("CREATE TABLE campaign (key TEXT PRIMARY KEY, name TEXT NOT NULL, started_by TEXT NOT NULL, "
+                         "started_utc_ns INTEGER NOT NULL, state TEXT NOT NULL)")
+        recorder.execute("CREATE TABLE file (campaign TEXT NOT NULL, name TEXT NOT NULL, part INTEGER NOT NULL, closed INTEGER NOT NULL, "
+                         "from_utc_ns INTEGER NOT NULL, to_utc_ns INTEGER NOT NULL, rows INTEGER NOT NULL, bytes INTEGER NOT NULL, "
+                         "sha256 TEXT NOT NULL, PRIMARY KEY (campaign, name))")
+        for i, key in enumerate(campaigns):
+            recorder.execute("INSERT INTO campaign VALUES (?, 'unit', 'test', ?, 'finished')", (key, 10**18 + i))
+        recorder.execute("INSERT INTO file VALUES (?, 'raw-0009.log.zst', 0, 1, 0, 0, 7, 7, 'gone')", (campaigns[0],))
+        recorder.commit()
+        asked_by_nobody(checks, rec, campaigns, serial, "while a recorder has it")
+    asked_by_nobody(checks, rec, campaigns, serial, "after it")
+    before = sorted(os.listdir(rec.folder))
+    checks.check(rec.run("list").returncode == 0, "whoever may write notes the results")
+    asked_by_nobody(checks, rec, campaigns, serial, "with results")
+    checks.equal(sorted(os.listdir(rec.folder)), before, "nothing was made beside it")
+    with open(index, "rb") as file:
+        whole = file.read()
+    for what, bytes_ in (("overwritten", b"no index" * 1000), ("cut", whole[:5000]), ("empty", b"")):
+        with open(index, "wb") as file:
+            file.write(bytes_)
+        for words in (("list",), ("trend", serial), ("archive", "verify")):
+            for run in (rec.run(*words), rec.as_nobody(*words)):
+                checks.check(run.returncode == 2 and run.stderr.count("\n") == 1 and index in run.stderr and "makes it anew" in run.stderr,
+                             f"an index that is {what}: vibrig {words[0]} says so and what to do", run.stdout + run.stderr)
+    os.remove(index)
+    run = rec.run("archive", "add", rec.folder)
+    checks.equal(sorted(c["campaign"] for c in rec.campaigns() or []), sorted(campaigns), "which does make it anew: " + run.stderr)
+
+
 def full_archive(checks, programs, folder, base):
     disk = recording_faults.SickDisk(folder)
     if disk.refused:
@@ -495,6 +572,8 @@ def main():
         sick_archive(checks, lab, disk, clone(base, os.path.join(folder, "another"), 3))
         os.mkdir(os.path.join(folder, "full"))
         full_archive(checks, programs, os.path.join(folder, "full"), small)
+        once(checks, programs, folder, small)
+        only_read(checks, programs, folder, rig.results, "0017")
         kills(checks, programs, folder, small, seed)
         grows(checks, programs, folder)
         if POSTGRES:

@@ -43,6 +43,16 @@ class Archive:
         return subprocess.run([self.program, *words, *self.where()], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               timeout=timeout, env={**os.environ, **(environment or {})})
 
+    def as_nobody(self, *words, where=True):
+        """As somebody who may only read, in the archive's folder."""
+        return subprocess.run(["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", self.program, *words,
+                               *(self.where() if where else [])], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60,
+                              cwd=self.folder)
+
+    def incoming(self):
+        """Folders below .incoming: what was begun and not ended."""
+        return [path for path in glob.glob(os.path.join(self.folder, ".incoming", "*")) if os.path.isdir(path)]
+
     def add(self, folder, rig, **more):
         return self.run("archive", "add", folder, "--rig", rig, **more)
 
@@ -68,6 +78,21 @@ class Archive:
             if there != wanted:
                 wrong.append(f"{folder}: {there}, {wanted}")
         return wrong
+
+
+def asked_by_nobody(checks, rec, campaigns, serial, when):
+    run = rec.as_nobody("list", "--json")
+    found = json.loads(run.stdout or '{"campaigns": []}')["campaigns"]
+    checks.check(run.returncode == 0 and sorted(c["campaign"] for c in found) == sorted(campaigns) and all(c["hash"] for c in found),
+                 f"who may only read lists a rig's campaigns with their results, {when}", run.stdout[-500:] + run.stderr)
+    run = rec.as_nobody("trend", serial)
+    checks.check(run.returncode == 0, f"and the unit's trend, {when}", run.stderr)
+    run = rec.as_nobody("archive", "verify", "--json")
+    checks.check(run.returncode in (0, 1) and json.loads(run.stdout or "{}").get("campaigns") == len(campaigns), f"and verifies, {when}",
+                 run.stderr)
+    run = rec.as_nobody("replay", campaigns[0], where=False)
+    checks.check("missing raw-0009.log.zst" in run.stderr and run.returncode in (0, 1), f"and replays by name what is not whole, {when}",
+                 run.stderr)
 
 
 def clone(campaign, to, days, serial=None, shift=None, scatter=None):

@@ -288,6 +288,7 @@ high = 2.0
                  "what is not valid is refused", no.stderr)
     for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
                          (text + "colour = 1\n", "unknown key colour"), (text.replace("high = 2.0", "high = -1"), "low not below high"),
+                         (text + text[text.index("[[limit]]"):], '"D_Fx" a second time'), (text + "[item]\nreceived = 9999-11-20\n", "day of issue"),
                          ("number = ", "C-17.toml:1"), (text.replace("[customer]", "[costumer]"), "unknown key costumer")):
         with open(paper, "w", encoding="utf-8") as file:
             file.write(wrong)

@@ -44,6 +44,24 @@ struct Study {
     [[nodiscard]] bool passed() const { return !result.test || result.test->probability >= level; }
 };
 
+/// Of the row at `place`, within what can be reckoned with.
+void require_within(const std::string& place, const char* column, double value, double low,
+                    double high) {
+    if (value >= low && value <= high) return;
+    plan::refuse(place + ": column " + column, Json(value).dump(),
+                 printed("a number from %g to %g", low, high));
+}
+
+planning::Reading reading_at(const std::string& place, const std::array<double, 4>& row,
+                             double sigma) {
+    constexpr std::array kInputs{"x1", "x2", "x3"};
+    for (std::size_t k = 0; k < kInputs.size(); ++k)
+        require_within(place, kInputs[k], row[k], -planning::kLargestInput,
+                       planning::kLargestInput);
+    require_within(place, "y", row[3], -planning::kLargestOutput, planning::kLargestOutput);
+    return {{row[0], row[1], row[2]}, row[3], sigma};
+}
+
 void read(const Options& options, Study& study) {
     const auto table = plan::read_table(plan::content_of(options.file), options.file,
                                         {{"x1", "x2", "x3", "y", "sigma", "count"}});
@@ -62,15 +80,15 @@ void read(const Options& options, Study& study) {
     for (std::size_t i = 0; i < table.rows.size(); ++i) {
         const std::vector<double>& row = table.rows[i];
         const std::string place = options.file + ":" + std::to_string(table.lines[i]);
-        planning::Reading reading{{row[column[0]], row[column[1]], row[column[2]]},
-                                  row[column[3]],
-                                  sigma ? row[*sigma] : options.sigma};
-        if (sigma && !(reading.sigma > 0))
-            plan::refuse(place + ": column sigma", Json(reading.sigma).dump(), "above 0");
+        planning::Reading reading =
+            reading_at(place, {row[column[0]], row[column[1]], row[column[2]], row[column[3]]},
+                       sigma ? row[*sigma] : options.sigma);
+        if (sigma)
+            require_within(place, "sigma", reading.sigma, planning::kSmallestSigma,
+                           planning::kLargestSigma);
         if (count) {
             // A mean of so many readings.
-            if (!(row[*count] >= 1))
-                plan::refuse(place + ": column count", Json(row[*count]).dump(), "1 or more");
+            require_within(place, "count", row[*count], 1, planning::kMostMeant);
             if (!(reading.sigma > 0) && row[*count] != 1)
                 plan::refuse(place + ": column count", "a mean without a sigma",
                              "--sigma or a column sigma, of one reading");
@@ -242,7 +260,8 @@ void add_calibrate(CLI::App& app, int& exit_code) {
                     "y (output); sigma (1 sigma of y) and count (readings that y is the mean of) "
                     "if known")
         ->required();
-    add_number(command, "--sigma", options.sigma, "1 sigma of one reading, if known", kAboveZero);
+    add_number(command, "--sigma", options.sigma, "1 sigma of one reading, if known",
+               calibration::planning::kSmallestSigma, calibration::planning::kLargestSigma);
     command.add_option("--without", options.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
     add_number(command, "--level", options.level, "of the tests of the residuals (0.01)", 1e-9,

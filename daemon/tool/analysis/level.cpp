@@ -99,9 +99,10 @@ void add_simulate_options(CLI::App& command, Options& o) {
                 1000);
     auto* step = add_number(command, "--step", o.step, "both channels tip by so much, arcmin",
                             -kRightAngle, kRightAngle);
-    add_number(command, "--step-at", o.step_s, "when, s; with --runs at any time", 0)->needs(step);
-    add_numbers(command, "--slow", o.slow, 3, "K1,K2,K3 to ramp to after settling");
-    add_number(command, "--ramp", o.ramp_s, "length of that ramp, s (60)", kAboveZero, 1e6);
+    add_number(command, "--step-at", o.step_s, "when, s; --runs draws the times", 0)->needs(step);
+    auto* slow = add_numbers(command, "--slow", o.slow, 3, "K1,K2,K3 to ramp to after settling");
+    add_number(command, "--ramp", o.ramp_s, "length of that ramp, s (60)", kAboveZero, 1e6)
+        ->needs(slow);
     add_number(command, "--torquer-limit", o.torquer_limit, "deg/h (3276.7)", kAboveZero, 1e9);
     command.add_option("--network", o.network, "fast (default), conventional, undamped")
         ->check(CLI::IsMember({"fast", "conventional", "undamped"}));

@@ -152,6 +152,16 @@ int run_many(const Options& options) {
 
 int run_simulate(const Options& options) {
     if (options.runs > 1) {
+        // Each has its own tilt and its own time of the step.
+        if (!options.plot.empty())
+            throw std::invalid_argument(
+                printed("--plot: found %s with --runs %zu, expected one start",
+                        options.plot.c_str(), options.runs));
+        if (options.step_s >= 0)
+            throw std::invalid_argument(
+                printed("--step-at: found %g with --runs %zu, whose steps come at any time; "
+                        "expected one start",
+                        options.step_s, options.runs));
         return run_many(options);
     }
     const levelling::Scenario start = scenario_of(options);

@@ -40,9 +40,11 @@ Json leverage_json(const uncertainty::Assessment& assessed) {
     return list;
 }
 
-std::string budget_json(const Identified& of, const uncertainty::MonteCarlo* drawn) {
+std::string budget_json(const Identified& of, std::optional<std::size_t> only,
+                        const uncertainty::MonteCarlo* drawn) {
     Json root = assessment_json(of.assessed), list = Json::array();
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        if (only && i != *only) continue;
         const auto& c = of.assessed.coefficients[i];
         Json one{{"name", estimator::parameter_names()[i]},
                  {"unit", estimator::parameter_unit(i)},
@@ -120,7 +122,7 @@ int run(const UncertaintyOptions& options) {
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
     if (!options.plot.empty()) draw_budget(assessed, options.plot);
-    std::cout << (options.json ? budget_json(identified, check)
+    std::cout << (options.json ? budget_json(identified, only, check)
                                : budget_table(assessed, only) +
                                      (check != nullptr ? monte_carlo_text(*check) : ""));
     return exit_status(assessed.verdict.level, options.strict);

@@ -12,6 +12,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
+#include "daemon/tool/analysis/zero_input.hpp"
 #include "daemon/tool/analysis/zero_output.hpp"
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/simulation.hpp"
@@ -19,6 +20,7 @@
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 #include "proto/option_value.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool::zero_command {
 
@@ -125,6 +127,7 @@ zeros::Calibration calibration_of(const Options& options, const std::string& fil
     if (options.azimuth != "none") {
         azimuth = read_columns(file, {options.azimuth, "time_s"}, show);
     }
+    check_increments(file, columns, azimuth);
     for (std::size_t k = 0; k < columns[0].values.size(); ++k) {
         zeros::Increment in;
         in.time_s = columns[0].times[k];
@@ -136,6 +139,15 @@ zeros::Calibration calibration_of(const Options& options, const std::string& fil
             azimuth.values.empty() ? std::nan("") : azimuth.values[k] * estimator::kRadPerDeg;
         if (!calibration.add(in)) break;
     }
+    // Without an update there is no result, but zeros that look like one.
+    const zeros::CalibrationResult result = calibration.result();
+    if (result.updates == 0)
+        throw std::runtime_error(
+            file + ": " +
+            (calibration.given_up()
+                 ? result.problems.front()
+                 : printed("found increments of %.6g s, expected %g s or more of them",
+                           columns[0].times.back() - columns[0].times.front(), settings.update_s)));
     return calibration;
 }
 
@@ -193,10 +205,23 @@ int run_simulate(const Options& options) {
         errors.accelerometer_cross[i][2] = options.real_misalignment_arcsec[i] * kRadPerArcsec;
     errors.vibration_g = options.vibration_g;
     if (!options.write.empty()) {
+        for (const auto& [asked, name] :
+             {std::pair{options.json, "--json"}, std::pair{!options.plot.empty(), "--plot"},
+              std::pair{options.both_ways, "--both-ways"},
+              std::pair{options.second_axis, "--second-axis"}}) {
+            if (asked)
+                throw std::invalid_argument(std::string(name) +
+                                            ": found it with --write, which has the increments of "
+                                            "one run instead of a result; expected one of them");
+        }
         (void)zeros::Calibration(s);  // refuses what cannot work
         write_increments(options, s, errors);
         return 0;
     }
+    if (options.both_ways && s.inverted)
+        throw std::invalid_argument(
+            "--both-ways: found it with --inverted, whose second run would be down as the first; "
+            "expected one of them");
     std::vector<zeros::Way> ways{{s.upright, s.inverted}};
     if (options.both_ways) ways.push_back({2, true});
     if (options.second_axis) ways.insert(ways.end(), {{1, false}, {1, true}});
@@ -207,6 +232,18 @@ int run_simulate(const Options& options) {
         runs.push_back(zeros::simulate(s, errors, options.period_s, options.seed + runs.size()));
     }
     return report(options, runs);
+}
+
+/// What belongs to a file.
+void refuse_file(const CLI::App& command, const Options& options) {
+    if (!options.file.empty())
+        throw std::invalid_argument("zero: found " + proto::printable(options.file) +
+                                    " with `simulate`, expected one of them");
+    for (const char* name : {"--azimuth", "--down", "--y-up", "--y-down"}) {
+        if (command.count(name) > 0)
+            throw std::invalid_argument(std::string(name) +
+                                        ": found it with `simulate`, expected a file with it");
+    }
 }
 
 void add_common(CLI::App& command, Options& o) {
@@ -293,8 +330,12 @@ void add_zero(CLI::App& app, int& exit_code) {
     simulate->add_option("--write", options->write,
                          "write the increments to this CSV file instead");
     simulate->footer("Example: vibrig zero simulate --scale 0,0,100 --both-ways");
-    simulate->callback(
-        [options, &exit_code] { exit_code = guarded([&] { return run_simulate(*options); }); });
+    simulate->callback([options, command, &exit_code] {
+        exit_code = guarded([&] {
+            refuse_file(*command, *options);
+            return run_simulate(*options);
+        });
+    });
     command->callback([options, simulate, &exit_code] {
         if (!simulate->parsed()) exit_code = guarded([&] { return run_file(*options); });
     });

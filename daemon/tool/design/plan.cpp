@@ -29,7 +29,7 @@ void require(bool good, const std::string& what, const std::string& expected) {
     if (!good) throw std::runtime_error(what + ", expected " + expected);
 }
 
-void check(Options& options) {
+void check(Options& options, bool blocks) {
     PlanRequest& request = options.request;
     for (const double level : request.levels_g) {
         require(std::isfinite(level) && level >= 0 && level <= 1000,
@@ -59,13 +59,16 @@ void check(Options& options) {
                 request.survey.asked(),
             "found --mount or --attitude alone",
             "--frequencies, --highest, --profile, --sweeps or --about with it");
+    require(!blocks || request.order == "random", "found --block with --order " + request.order,
+            "--order random with it");
     require(request.evaluate.empty() || (request.runs == 0 && request.targets.empty()),
             "found --evaluate with --runs or --targets", "one of them");
 }
 
-int run(Options& options) {
+/// `blocks`: somebody asked for their size.
+int run(Options& options, bool blocks) {
     PlanStudy result;
-    check(options);
+    check(options, blocks);
     {
         Progress progress("planning");
         progress.show(0, 1);
@@ -115,9 +118,13 @@ void add_turntable(CLI::App& command, Options& options) {
             "split-86")
         ->needs(turntable)
         ->check(CLI::IsMember({"free", "both", "split-68", "split-86"}));
-    for (const char* of_the_rig : {"--positions", "--levels", "--grid", "--evaluate", "--done",
-                                   "--targets", "--config", "--frequencies", "--highest", "--mount",
-                                   "--profile", "--attitude", "--sweeps", "--sweep-s", "--about"}) {
+    for (const char* of_the_rig :
+         {"--positions",   "--levels",     "--grid",        "--evaluate",  "--done",
+          "--targets",     "--config",     "--frequencies", "--highest",   "--mount",
+          "--profile",     "--attitude",   "--sweeps",      "--sweep-s",   "--about",
+          "--outer",       "--inner",      "--azimuth",     "--forbidden", "--forbidden-within",
+          "--noise-per-g", "--time-costs", "--dwell",       "--settle",    "--ramp",
+          "--slew",        "--order",      "--block"}) {
         turntable->excludes(command.get_option(of_the_rig));
     }
 }
@@ -130,16 +137,19 @@ void add_candidates(CLI::App& command, Options& options) {
     add_numbers(command, "--levels", request.levels_g, 0,
                 "peak acceleration at the platform, g (0,2,4,4.667,6)", 0, 1e3);
     add_number(command, "--grid", request.grid_deg, "candidates every so many deg of each gimbal",
-               5, 90);
+               5, 90)
+        ->excludes(command.get_option("--positions"));
     for (const auto& [name, range] :
          {std::pair{"--outer", &options.outer}, std::pair{"--inner", &options.inner},
           std::pair{"--azimuth", &options.azimuth}}) {
         add_numbers(command, name, *range, 2,
                     "gimbal limits LOW,HIGH as the encoders count, deg (gimbal.travel_deg)");
     }
-    command.add_option("--forbidden", request.forbidden, "CSV of positions to keep away from");
+    CLI::Option* const forbidden =
+        command.add_option("--forbidden", request.forbidden, "CSV of positions to keep away from");
     add_number(command, "--forbidden-within", request.limits.forbidden_within,
-               "largest difference of the three angles that counts as near, deg (10)", 0, 360);
+               "largest difference of the three angles that counts as near, deg (10)", 0, 360)
+        ->needs(forbidden);
     add_number(command, "--noise-per-g", request.noise_per_g,
                "noise grows with the level as hypot(1, this x level) (0)", 0, 1e3);
     command.add_option("--without", request.without, "terms the model has not, such as D12,D13")
@@ -159,14 +169,16 @@ void add_survey(CLI::App& command, Options& options) {
         .add_option("--mount", survey.mount,
                     "isolated, or hard: the platform bolted to the table (spectrum.mount)")
         ->check(CLI::IsMember({"isolated", "hard"}));
-    command.add_option("--profile", survey.profile,
-                       "positions for the drift under this profile: a JSON file, or a name of "
-                       "vibrig predict --list or of a [[profile]] of the configuration");
+    CLI::Option* const profile =
+        command.add_option("--profile", survey.profile,
+                           "positions for the drift under this profile: a JSON file, or a name of "
+                           "vibrig predict --list or of a [[profile]] of the configuration");
     command
         .add_option("--attitude", survey.attitudes,
                     "with --profile: ALPHA,BETA,GAMMA of the gimbals, deg; again for more (the "
                     "positions)")
-        ->allow_extra_args(false);
+        ->allow_extra_args(false)
+        ->needs(profile);
     CLI::Option* sweeps =
         add_numbers(command, "--sweeps", survey.sweeps, 2,
                     "LOW,HIGH in Hz: sweeps between them first, up and down, at the three "
@@ -238,19 +250,23 @@ void add_plan(CLI::App& app, int& exit_code) {
         "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
         "asks for\nmore than the shaker's limits, 2 bad usage or input.");
-    for (const char* other : {"--evaluate", "--done", "--targets", "--grid", "--time-costs"}) {
+    // A survey takes the positions as they are listed.
+    for (const char* other :
+         {"--evaluate", "--done", "--targets", "--grid", "--time-costs", "--outer", "--inner",
+          "--azimuth", "--forbidden", "--forbidden-within"}) {
         for (const char* survey :
              {"--frequencies", "--highest", "--profile", "--sweeps", "--about"})
             command->get_option(other)->excludes(command->get_option(survey));
     }
     const CLI::Option* order = command->get_option("--order");
-    command->callback([options, order, &exit_code] {
+    const CLI::Option* block = command->get_option("--block");
+    command->callback([options, order, block, &exit_code] {
         options->request.ordered = order->count() > 0;
         if (options->request.survey.asked() && order->count() == 0)
             options->request.order = "balanced";
         exit_code = guarded([&] {
             return options->on_turntable ? planner::run_turntable(*options)
-                                         : planner::run(*options);
+                                         : planner::run(*options, block->count() > 0);
         });
     });
 }

@@ -1,9 +1,11 @@
 #pragma once
 
-#include <fstream>
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -11,9 +13,14 @@ namespace vibrig::tool {
 class Answers {
   public:
     explicit Answers(const std::string& path) : path_(path) {
-        std::ifstream file(path);
-        if (!file) throw std::runtime_error(path + ": cannot be read");
-        json_ = nlohmann::ordered_json::parse(file, nullptr, false);
+        constexpr std::size_t kLongestFile = std::size_t{1} << 20;
+        std::string text;
+        try {
+            text = proto::read_whole_file(path, kLongestFile);
+        } catch (const std::runtime_error& error) {
+            throw std::runtime_error(path + ": " + error.what());
+        }
+        json_ = nlohmann::ordered_json::parse(text, nullptr, false);
         if (!json_.is_object())
             throw std::runtime_error(path + ": expected a JSON object, question to answer");
     }

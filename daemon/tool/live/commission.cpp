@@ -33,6 +33,7 @@
 #include "daemon/tool/live/toml_edit.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -149,6 +150,10 @@ class Dialogue {
                            (usual.empty() ? "" : "; Enter: " + usual) + "]";
         print_wrapped(out_, "? " + text);
         const std::string answer = typed();
+        if (!proto::is_utf8(answer)) {
+            print_wrapped(out_, "  found \"" + proto::printable(answer) + "\", expected UTF-8");
+            return;
+        }
         try {
             commission_command(client_, options_.by,
                                {{"do", "answer"}, {"id", question["id"]}, {"value", answer}});
@@ -315,7 +320,7 @@ int commission(const CommissionOptions& options) {
                                      "after them");
         gyros = gyros || part == "gyros";
         if (part != "gyros" && std::ranges::find(kMeasured, part) == kMeasured.end())
-            throw std::runtime_error("found \"" + part +
+            throw std::runtime_error("found \"" + proto::printable(part) +
                                      "\", expected bus, gimbals, accelerometers, earth, gyros, "
                                      "watchdog, stop, units or excitation");
     }
@@ -366,7 +371,8 @@ void add_local_socket(CLI::App& command, CommissionOptions& options) {
 void add_persons(CLI::App& command, CommissionOptions& options) {
     add_local_socket(command, options);
     command.add_option("--by", options.by, "Who stands at the rig; goes into the record")
-        ->required();
+        ->required()
+        ->check(one_line("a name"));
 }
 
 }  // namespace
@@ -385,8 +391,10 @@ void add_commission(CLI::App& app, int& exit_code) {
             "state at a small level. Without: all of the first")
         ->expected(0, 5);
     add_local_socket(commissioning, *options);
-    commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
-    commissioning.add_option("--second", options->second, "Another person, for gyros");
+    commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record")
+        ->check(one_line("a name"));
+    commissioning.add_option("--second", options->second, "Another person, for gyros")
+        ->check(one_line("a name"));
     add_identity(commissioning, *options);
     commissioning.add_flag("--by-hand", options->by_hand,
                            "Nothing is commanded: a person turns the gimbals");
@@ -432,7 +440,9 @@ void add_commission(CLI::App& app, int& exit_code) {
     CLI::App& accepting = *commissioning.add_subcommand(
         "accept", "Write what was found into the configuration, and record it by two persons");
     add_persons(accepting, *accepted);
-    accepting.add_option("--second", accepted->second, "Another person")->required();
+    accepting.add_option("--second", accepted->second, "Another person")
+        ->required()
+        ->check(one_line("a name"));
     add_identity(accepting, *accepted);
     accepting.add_option("--config", accepted->configuration,
                          "The daemon's configuration file; default: as the daemon names it");

@@ -20,6 +20,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/commission_registers.hpp"
+#include "daemon/tool/live/remote.hpp"
 #include "drivers/can/can_port.hpp"
 #include "proto/candump.hpp"
 #include "proto/durable_file.hpp"
@@ -314,7 +315,8 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code) {
         .add_option("--config", options.configuration,
                     "--find: a configuration whose can.sample_rate_hz has to be the rate measured")
         ->check(CLI::ExistingFile);
-    command.add_option("--by", options.by, "Who changes bits, or turns gimbals");
+    command.add_option("--by", options.by, "Who changes bits, or turns gimbals")
+        ->check(one_line("a name"));
     command.add_option("--folder", options.folder,
                        "commission.folder, where what is proven or found is kept");
     command.add_flag("--json", options.json, "As JSON");

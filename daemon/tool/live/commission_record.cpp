@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -16,15 +14,20 @@
 #include "daemon/commission/person_signature.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
 namespace {
 
 std::string text_of_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw std::runtime_error(path + ": cannot be read");
-    return {std::istreambuf_iterator<char>(file), {}};
+    // More than any configuration, or what was found for one, can be.
+    constexpr std::size_t kLongestFile = std::size_t{16} << 20;
+    try {
+        return proto::read_whole_file(path, kLongestFile);
+    } catch (const std::runtime_error& error) {
+        throw std::runtime_error(path + ": " + error.what());
+    }
 }
 
 bool agreed(const CommissionOptions& options, const std::string& question) {

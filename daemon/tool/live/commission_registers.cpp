@@ -16,6 +16,7 @@
 #include "daemon/commission/places.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_registers.hpp"
+#include "daemon/tool/live/remote.hpp"
 #include "drivers/shaker/modbus_link.hpp"
 #include "proto/json_text.hpp"
 
@@ -192,13 +193,18 @@ void add_commission_registers(CLI::App& commissioning, int& exit_code) {
         "shows: reads only. With --write, try the registers that a configuration states, one by "
         "one, while nothing can move. Needs no daemon",
         find_registers, "vibrig commission registers: ");
-    command.add_option("--by", options.by, "Who stands at the panel")->required();
-    command.add_option("--tcp", options.tcp, "Modbus TCP, HOST or HOST:PORT (502)");
+    command.add_option("--by", options.by, "Who stands at the panel")
+        ->required()
+        ->check(one_line("a name"));
+    command.add_option("--tcp", options.tcp, "Modbus TCP, HOST or HOST:PORT (502)")
+        ->check(one_line("HOST or HOST:PORT"));
     command.add_option("--device", options.device, "Modbus RTU, serial device (8E1)");
     command.add_option("--plate", options.plate,
                        "Maker, type and firmware on its plate, of a device that does not say them "
                        "by function 17");
-    command.add_option("--baud", options.baud, "Of the serial device")->capture_default_str();
+    command.add_option("--baud", options.baud, "Of the serial device")
+        ->capture_default_str()
+        ->check(CLI::Range(300, 4'000'000));  // as shaker.baud
     command.add_option("--unit", options.unit, "Modbus unit")
         ->capture_default_str()
         ->check(CLI::Range(0, 247));

@@ -4,16 +4,20 @@
 #include <sys/types.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
 
 #include "daemon/tool/commands.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -35,6 +39,7 @@ struct PkiOptions {
 };
 
 constexpr const char* kAuthority = "authority";
+constexpr const char* kServer = "server";
 constexpr const char* kRevoked = "revoked.crl";
 
 /// Keys are for their owner only, from the moment they exist.
@@ -50,15 +55,18 @@ void write(const fs::path& path, const std::string& text, bool secret) {
 }
 
 std::string read(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    text << file.rdbuf();
-    if (!file) throw PkiError("cannot read " + path.string());
-    if (text.str().empty())
+    constexpr std::size_t kLongestFile = std::size_t{16} << 20;  // of a list of revoked ones
+    std::string text;
+    try {
+        text = proto::read_whole_file(path.string(), kLongestFile);
+    } catch (const std::runtime_error& error) {
+        throw PkiError(path.string() + ": " + error.what());
+    }
+    if (text.empty())
         throw PkiError(path.string() +
                        ": found an empty file, expected a certificate or a key in PEM; bring it "
                        "back from a copy, or take it away with the authority that goes with it");
-    return text.str();
+    return text;
 }
 
 void save(const fs::path& folder, const std::string& name, const Identity& identity) {
@@ -71,19 +79,64 @@ Identity authority_in(const fs::path& folder) {
             read(folder / (std::string(kAuthority) + ".key"))};
 }
 
-/// Before anything is written.
+/// What of a name is no name of a certificate and of files; empty: all is well.
+std::string wrong_with(const std::string& name) {
+    // X.520's upper bound of a common name, in characters; of a file's name 255 bytes with ".key".
+    constexpr std::ptrdiff_t kCharacters = 64;
+    constexpr std::size_t kBytes = 250;
+    if (name.empty() || proto::printable(name, name.size()) != name)
+        return "a name, one line of UTF-8 without control characters";
+    if (name.find_first_of("/\\") != std::string::npos || name.front() == '.')
+        return "a name without '/' and '\\' that does not begin with '.': files are called so";
+    const auto characters = std::ranges::count_if(
+        name, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80; });
+    if (characters > kCharacters || name.size() > kBytes) return "a name of 64 characters at most";
+    if (name == kAuthority || name == kServer)
+        return "another name: the files of the " + name + " are called so";
+    return {};
+}
+
 void check_people(const PkiOptions& options) {
-    std::set<std::string> seen{kAuthority, "server"};
-    for (const auto* const names : {&options.viewers, &options.operators, &options.admins}) {
+    std::set<std::string> seen;
+    for (const auto& [option, names] : {std::pair{"--viewer: ", &options.viewers},
+                                        {"--operator: ", &options.operators},
+                                        {"--admin: ", &options.admins}}) {
         for (const std::string& name : *names) {
-            const bool plain = !name.empty() && name.find_first_of("/\\") == std::string::npos &&
-                               name.front() != '.' && seen.insert(name).second;
-            if (!plain) throw PkiError("found '" + name + "', expected each person's name once");
+            const std::string found = option + ("found \"" + proto::printable(name)) + '"';
+            if (const auto expected = wrong_with(name); !expected.empty())
+                throw PkiError(found + ", expected " + expected);
+            if (!seen.insert(name).second)
+                throw PkiError(found + " a second time, expected each person once");
             const fs::path key = fs::path(options.folder) / (name + ".key");
             if (fs::exists(key))
                 throw PkiError(key.string() + " is there already; nothing was changed");
         }
     }
+}
+
+/// Whether the server has its certificate already. One that does not do, whose key the rig may be
+/// using, is never replaced.
+bool check_server(const PkiOptions& options) {
+    for (const std::string& host : options.hosts) {
+        if (!serve::is_host(host))
+            throw PkiError("--host: found \"" + proto::printable(host) +
+                           "\", expected a name such as rig.lab, or an address");
+    }
+    const fs::path folder = options.folder;
+    const fs::path certificate = folder / (std::string(kServer) + ".crt");
+    const fs::path key = folder / (std::string(kServer) + ".key");
+    if (options.hosts.empty() || (!fs::exists(certificate) && !fs::exists(key))) return false;
+    std::string why;
+    if (!fs::exists(key))
+        why = "has no " + key.string() + " beside it";
+    else if (!fs::exists(folder / (std::string(kAuthority) + ".key")))
+        why = "comes from an authority whose key is not there";
+    else
+        why = serve::unfit_for(options.hosts, read(certificate), authority_in(folder).certificate);
+    if (why.empty()) return true;
+    throw PkiError("--host: " + certificate.string() + " is there already and " + why +
+                   "; nothing was changed. For a new one, which names what is asked for then, "
+                   "move server.crt and server.key away first");
 }
 
 /// For people, as it happens.
@@ -97,10 +150,37 @@ int say_all(const PkiOptions& options, const Json& all) {
     return 0;
 }
 
-int init(const PkiOptions& options) {
-    check_people(options);
+/// Made, unless it is `there`; what is said of it to machines.
+Json make_server(const PkiOptions& options, const Identity& authority, bool there) {
     const fs::path folder = options.folder;
-    fs::create_directories(folder);
+    const std::string file = (folder / kServer).string();
+    if (!there) {
+        // A common name is short; who connects looks at the hosts.
+        constexpr std::size_t kCommonName = 64;
+        const auto& first = options.hosts.front();
+        save(folder, kServer,
+             serve::make_identity(
+                 {CertificateSettings::Use::server, first.size() <= kCommonName ? first : kServer,
+                  "", options.hosts, std::chrono::hours(-1), std::chrono::hours(24 * options.days)},
+                 &authority));
+    }
+    say(options, "server: " + file + ".crt, .key" + (there ? "; those that were there" : ""));
+    return {{"hosts", options.hosts},
+            {"certificate", file + ".crt"},
+            {"key", file + ".key"},
+            {"is_new", !there}};
+}
+
+int init(const PkiOptions& options) {
+    // All of it before anything is written.
+    check_people(options);
+    const bool server_is_there = check_server(options);
+    const fs::path folder = options.folder;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error)
+        throw PkiError("--folder: found \"" + proto::printable(options.folder) +
+                       "\", expected a folder, or where one can be made: " + error.message());
     const auto valid_for = std::chrono::hours(24 * options.days);
     Identity authority;
     Json all{{"folder", folder.string()}, {"authority", (folder / kAuthority).string() + ".crt"}};
@@ -139,16 +219,7 @@ int init(const PkiOptions& options) {
                                  {"key", file + ".key"},
                                  {"browser", file + ".p12"}});
     };
-    if (!options.hosts.empty()) {
-        save(folder, "server",
-             serve::make_identity({CertificateSettings::Use::server, options.hosts.front(), "",
-                                   options.hosts, std::chrono::hours(-1), valid_for},
-                                  &authority));
-        const std::string file = (folder / "server").string();
-        say(options, "server: " + file + ".crt, .key");
-        all["server"] = {
-            {"hosts", options.hosts}, {"certificate", file + ".crt"}, {"key", file + ".key"}};
-    }
+    if (!options.hosts.empty()) all["server"] = make_server(options, authority, server_is_there);
     for (const std::string& name : options.viewers) client(name, "viewer");
     for (const std::string& name : options.operators) client(name, "operator");
     for (const std::string& name : options.admins) client(name, "admin");
@@ -163,6 +234,9 @@ int revoke(const PkiOptions& options) {
     for (const std::string& name : options.revoked) {
         const fs::path certificate = folder / (name + ".crt");
         if (name == kAuthority) throw PkiError("the authority cannot revoke itself");
+        if (proto::printable(name, name.size()) != name)
+            throw PkiError("name: found \"" + proto::printable(name) +
+                           "\", expected somebody's, one line of UTF-8");
         const std::string before = fs::exists(list) ? read(list) : std::string{};
         std::string text;
         try {
@@ -212,7 +286,9 @@ void add_pki(CLI::App& app, int& exit_code) {
     making.add_flag("--json", options.json, "Print what was made as JSON");
     making.footer(
         "Example: vibrig pki init --host rig.lab --host 10.0.0.5 --operator ada --viewer wall\n"
-        "Again, with other names, it adds them. On the rig:\n"
+        "Again, with other people, it adds them; the server's certificate stays as it is, and one\n"
+        "that does not name each --host is refused: move server.crt and server.key away first.\n"
+        "On the rig:\n"
         "  [server]\n"
         "  remote = \"0.0.0.0:8443\"\n"
         "  certificate = \"server.crt\"\n"

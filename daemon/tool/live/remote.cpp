@@ -14,6 +14,7 @@
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -228,15 +229,22 @@ void add_order(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char
     options.at.expired_too = kind == v1::Command::abort;
     options.by = login_name();
     add_socket(command, options.at);
-    command.add_option("--by", options.by, "Who commands; goes into the event log")
-        ->capture_default_str();
+    auto* const by =
+        command.add_option("--by", options.by, "Who commands; goes into the event log")
+            ->capture_default_str();
+    // A stop does not wait for a better name.
+    if (kind == v1::Command::abort)
+        by->transform([](const std::string& text) { return proto::printable(text, text.size()); });
+    else
+        by->check(one_line("a name"));
     command.add_flag("--json", options.json, "Print the daemon's answer as JSON");
     std::string example = std::string("Example: vibrig ") + name;
     if (kind == v1::Command::acknowledge) {
         command
             .add_option("what", options.argument,
                         "What is acknowledged, as `vibrig status` names it")
-            ->required();
+            ->required()
+            ->check(one_line("what `vibrig status` names"));
         example += " trip";
     }
     command.footer(example + " --by 'Ada Lovelace'");
@@ -250,10 +258,26 @@ void wait_for_rest(serve::Client& client) {
         std::this_thread::sleep_for(kLook);
 }
 
+CLI::Validator one_line(const std::string& what) {
+    return CLI::Validator(
+        [what](const std::string& text) {
+            // Nothing at all is refused for every option, by proto::refuse_empty_values().
+            const bool blank = !text.empty() && text.find_first_not_of(' ') == std::string::npos;
+            if (!blank && proto::printable(text, text.size()) == text) return std::string();
+            return "found \"" + proto::printable(text) + "\", expected " + what +
+                   (blank ? "" : ", one line of UTF-8 without control characters");
+        },
+        "");
+}
+
 std::string json_of(const v1::Command& command) {
     std::string json;
+    // protobuf would say so by itself, too, on standard error.
+    if (!proto::is_utf8(command.by()))
+        throw serve::ClientError("--by: found \"" + proto::printable(command.by()) +
+                                 "\", expected a name in UTF-8");
     if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
-        throw serve::ClientError("--by: not UTF-8");
+        throw serve::ClientError("the command cannot be written as JSON");
     return json;
 }
 
@@ -323,11 +347,12 @@ void add_remote(CLI::App& app, int& exit_code) {
     const auto [testing, test_options] = add_command<TestOptions>(
         app, exit_code, "selftest",
         "What is looked at before a campaign; exit code 1 unless all is well", self_test, kWho);
-    testing.add_option(
-        "--by", test_options.by,
-        "Who orders a loop check and a proof of the safe state first, about a minute "
-        "at selftest.table_g: the bands of [selftest], then whether the table stops "
-        "by order and when nobody feeds its watchdog");
+    testing
+        .add_option("--by", test_options.by,
+                    "Who orders a loop check and a proof of the safe state first, about a minute "
+                    "at selftest.table_g: the bands of [selftest], then whether the table stops "
+                    "by order and when nobody feeds its watchdog")
+        ->check(one_line("a name"));
     testing
         .add_flag("--emergency-stop", test_options.emergency_stop,
                   "Ask for the emergency stop at the end, too; it trips as ever")

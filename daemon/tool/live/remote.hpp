@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <CLI/Validators.hpp>
 #include <iosfwd>
 #include <string>
 
@@ -11,6 +12,9 @@
 /// What the commands that talk to a running daemon share.
 namespace vibrig::tool {
 
+/// Of a name or a word that goes to the daemon: what it would refuse, bytes that are not UTF-8,
+/// control characters and blanks alone, is refused before anybody is asked. `what`: "a name".
+[[nodiscard]] CLI::Validator one_line(const std::string& what);
 /// VIBRIG_SOCKET, else the socket of the installed daemon.
 [[nodiscard]] std::string default_socket();
 /// --socket, --host, --identity.

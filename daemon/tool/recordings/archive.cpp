@@ -44,6 +44,7 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
         std::cout << proto::json_text(Json{{"folder", folder},
                                            {"done", done},
                                            {"campaign", entry.key},
+                                           {"rig", entry.rig},
                                            {"hash", entry.hash},
                                            {"unit", entry.unit_serial},
                                            {"verdict", entry.verdict},
@@ -51,7 +52,12 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
                                            {"moved", moved_json(moved)}})
                   << '\n';
     } else {
-        std::cout << folder << ": " << done << ", " << entry.key << '\n';
+        std::cout << folder << ": " << done << ", " << entry.key;
+        if (delivery.elsewhere)
+            std::cout << ": the same recording is there already, of rig '" << entry.rig << "', "
+                      << (delivery.kind == archive::Delivery::Kind::was_there ? "nothing was copied"
+                                                                              : "and was damaged");
+        std::cout << '\n';
         for (const auto& one : moved)
             std::cout << "  " << estimator::parameter_names()[one.position] << " is " << one.value
                       << ", " << one.by.expected << " +- " << one.by.sigma << " by this unit's "
@@ -78,7 +84,10 @@ int add(const AddOptions& o) {
     }
     int code = 0;
     for (const auto& given : o.folders) {
-        const auto found = archive::campaign_folders(given);
+        const auto found =
+            archive::campaign_folders(given, [](const std::string& path, const std::string& why) {
+                std::cerr << path << ": passed by: " << why << '\n';
+            });
         if (found.empty())
             throw std::runtime_error(given +
                                      ": found no campaign.h5 in it or in folders below, "

@@ -1,9 +1,8 @@
 #include "daemon/tool/recordings/archive_place.hpp"
 
-#include <unistd.h>
-
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -34,6 +33,15 @@ std::string folder_here() {
          {std::string("."), environment("VIBRIG_RECORDINGS"), std::string("/var/lib/vibrig")})
         if (!folder.empty() && fs::exists(archive::index_in(folder), error)) return folder;
     return "";
+}
+
+/// As it goes into a folder's name, JSON and an index; empty: it is fine.
+std::string rig_name_rule(const std::string& rig) {
+    constexpr std::size_t kLongest = 64;
+    const bool good =
+        rig.size() <= kLongest && proto::is_utf8(rig) &&
+        std::ranges::none_of(rig, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+    return good ? "" : "1 to 64 bytes of UTF-8 without control characters";
 }
 
 std::string date_text(std::int64_t utc_ns, const char* format) {
@@ -88,6 +96,10 @@ Whereabouts whereabouts_of(const ArchiveOptions& options) {
                                  "', expected postgresql://...");
     if (index.empty() && !folder.empty()) index = archive::index_in(folder);
     if (found.rig.empty()) found.rig = archive::host_name();
+    if (const auto expected = rig_name_rule(found.rig); !expected.empty())
+        throw std::runtime_error(
+            (!options.rig.empty() ? "--rig" : options.config + ": archive.rig") + ": found '" +
+            proto::printable(found.rig) + "', expected " + expected);
     found.place = {folder, index};
     return found;
 }
@@ -99,9 +111,18 @@ std::unique_ptr<archive::Index> open_index(const ArchiveOptions& options) {
             "found no recordings.sqlite3 here, in $VIBRIG_RECORDINGS or in /var/lib/vibrig, "
             "expected --archive FOLDER");
     using Mode = archive::Database::Mode;
-    if (archive::is_server(at.place.index) || ::access(at.place.index.c_str(), W_OK) != 0)
-        return std::make_unique<archive::Index>(at.place.index, Mode::read);
-    auto index = std::make_unique<archive::Index>(at.place.index, Mode::write);
+    const std::string& where = at.place.index;
+    if (archive::is_server(where)) return std::make_unique<archive::Index>(where, Mode::read);
+    // Beside campaigns an empty file is none of a new index: reading says what to do.
+    std::error_code none;
+    const bool cut =
+        fs::file_size(where, none) == 0 &&
+        !archive::campaign_folders(at.place.folder, [](const auto&, const auto&) {}).empty();
+    const bool writes = archive::may_write(where) && !cut;
+    auto index = std::make_unique<archive::Index>(where, writes ? Mode::write : Mode::read);
+    // Whoever may not note the results reads them for this once.
+    if (!writes && !index->without_result().empty())
+        index = std::make_unique<archive::Index>(where, Mode::copy);
     Progress progress("reading results");
     archive::read_results(
         *index, at.place.folder, at.rig,

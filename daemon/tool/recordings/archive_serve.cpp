@@ -1,5 +1,6 @@
 // vibrig archive serve: the archive for a browser.
 #include <csignal>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 
@@ -9,6 +10,7 @@
 #include "daemon/tool/recordings/archive_pages.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/result.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -40,8 +42,21 @@ struct ServeOptions {
     ArchiveOptions where = {};
 };
 
+/// As vibrigd's server.page and server.remote, whose server takes the port as it comes.
+void check_port(const char* option, const std::string& address) {
+    if (address.empty()) return;
+    const std::size_t colon = address.rfind(':');
+    std::uint16_t port = 0;
+    if (colon == std::string::npos || colon == 0 ||
+        !proto::read_number(std::string_view(address).substr(colon + 1), port))
+        throw std::runtime_error(std::string(option) + ": found '" + proto::printable(address) +
+                                 "', expected ADDRESS:PORT with a port from 0 to 65535");
+}
+
 int serve_archive(const ServeOptions& options) {
     ServeOptions o = options;
+    check_port("--page", o.page);
+    check_port("--remote", o.remote);
     const Whereabouts at = whereabouts_of(o.where);
     if (at.place.folder.empty() || !std::filesystem::is_directory(at.place.folder))
         throw std::runtime_error("--archive: found '" + at.place.folder +

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -17,6 +18,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/analysis.hpp"
 #include "daemon/report/certificate.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/remote.hpp"
@@ -25,6 +27,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -62,13 +65,28 @@ class PaperTable {
     [[nodiscard]] std::string text(const char* name) const {
         const auto* node = table_.get(name);
         if (node == nullptr) return {};
-        if (const auto* date = node->as_date()) {
-            std::ostringstream out;
-            out << date->get();
-            return out.str();
-        }
         if (const auto value = node->value<std::string>()) return *value;
         refuse(file_, *node, std::string(name) + ": expected a text");
+    }
+    /// YYYY-MM-DD, as the configuration has its dates; none after `today`.
+    [[nodiscard]] std::string past_date(const char* name, const std::string& today) const {
+        const auto* node = table_.get(name);
+        if (node == nullptr) return {};
+        std::ostringstream found;
+        if (const auto* words = node->as_string())
+            found << std::quoted(words->get());
+        else
+            found << toml::node_view<const toml::node>(*node);
+        const std::string text = found.str();
+        if (!node->is_date())
+            refuse(file_, *node,
+                   std::string(name) + ": found " + proto::printable(text) +
+                       ", expected a date such as " + today + ", without quotes");
+        if (text > today)
+            refuse(file_, *node,
+                   std::string(name) + ": found " + text +
+                       ", expected none after the day of issue (UTC), " + today);
+        return text;
     }
     [[nodiscard]] std::optional<double> number(const char* name) const {
         const auto* node = table_.get(name);
@@ -99,7 +117,24 @@ report::Limit limit_of(const std::string& file, const toml::node& node) {
     return limit;
 }
 
-Issue read_paper(const std::string& file) {
+/// One for each coefficient: two would be two statements of conformity, which may contradict.
+std::vector<report::Limit> limits_of(const std::string& file, const toml::node* limits) {
+    std::vector<report::Limit> all;
+    if (limits == nullptr) return all;
+    if (limits->as_array() == nullptr) refuse(file, *limits, "limit: expected [[limit]] tables");
+    for (const auto& node : *limits->as_array()) {
+        auto limit = limit_of(file, node);
+        if (std::ranges::find(all, limit.coefficient, &report::Limit::coefficient) != all.end())
+            refuse(file, node,
+                   "limit: found coefficient \"" + limit.coefficient +
+                       "\" a second time, expected one limit of each");
+        all.push_back(std::move(limit));
+    }
+    return all;
+}
+
+/// Of what is issued at that time.
+Issue read_paper(const std::string& file, std::int64_t utc_ns) {
     std::ifstream in(file);
     if (!in || std::filesystem::is_directory(file))
         throw std::runtime_error(file + ": cannot be read");
@@ -115,6 +150,7 @@ Issue read_paper(const std::string& file) {
     const PaperTable top(file, root,
                          {"number", "guard_band", "laboratory", "customer", "item", "limit"});
     Issue issue;
+    issue.utc_ns = utc_ns;
     issue.number = top.text("number");
     if (issue.number.empty())
         throw std::runtime_error(file + ": number: found nothing, expected the certificate's");
@@ -139,7 +175,7 @@ Issue read_paper(const std::string& file) {
         issue.customer_address = t.text("address");
     });
     section("item", {"received", "condition"}, [&](const PaperTable& t) {
-        issue.received = t.text("received");
+        issue.received = t.past_date("received", report::utc_text(utc_ns).substr(0, 10));
         issue.condition = t.text("condition");
     });
     for (const auto& [name, what] : {std::pair{&issue.laboratory, "[laboratory] name"},
@@ -147,11 +183,7 @@ Issue read_paper(const std::string& file) {
         if (name->empty())
             throw std::runtime_error(file + ": " + what + ": found nothing, expected it");
     }
-    if (const auto* limits = root.get("limit")) {
-        if (limits->as_array() == nullptr)
-            refuse(file, *limits, "limit: expected [[limit]] tables");
-        for (const auto& node : *limits->as_array()) issue.limits.push_back(limit_of(file, node));
-    }
+    issue.limits = limits_of(file, root.get("limit"));
     return issue;
 }
 
@@ -214,16 +246,10 @@ void say_issued(const CertificateArguments& arguments, const std::string& number
 }
 
 int certify(const CertificateArguments& arguments) {
-    Issue issue = read_paper(arguments.paper);
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    Issue issue = read_paper(arguments.paper,
+                             std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
     issue.by = arguments.by;
-    try {
-        static_cast<void>(nlohmann::json(issue.by).dump());
-    } catch (const nlohmann::json::exception&) {
-        throw std::runtime_error("--by: found bytes that are not UTF-8, expected a name");
-    }
-    issue.utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                       std::chrono::system_clock::now().time_since_epoch())
-                       .count();
     for (const char* kind : kKinds) proto::check_output(arguments.output + kind);
     if (!arguments.no_journal) look_for_daemon(arguments);
     const auto campaign = read_named_campaign(arguments.campaign);
@@ -274,7 +300,9 @@ void add_certificate(CLI::App& app, int& exit_code) {
         .add_option("--paper", arguments.paper,
                     "TOML: number, [laboratory], [customer], [item], [[limit]]")
         ->required();
-    command.add_option("--by", arguments.by, "named person who issues it")->required();
+    command.add_option("--by", arguments.by, "named person who issues it")
+        ->required()
+        ->check(one_line("a name"));
     command.add_option("-o,--output", arguments.output,
                        "files to write, without .html, .pdf, .json (default certificate)");
     add_socket(command, arguments.at);

@@ -121,6 +121,62 @@ TEST_F(ArchiveIndex, LeavesAnothersDatabaseAsItIs) {
     EXPECT_EQ(names[0].texts.at(0), "event");
 }
 
+TEST_F(ArchiveIndex, IsReadAsARecorderLeftItAndNothingIsMadeBesideIt) {
+    // GIVEN a recorder's index with a log, of before it had a number, and nobody who writes
+    {
+        record::Index recorder(folder_, [](const std::string&) {});
+    }
+    journal::Database(path_).execute(
+        "INSERT INTO campaign VALUES ('one', 'first', 'Ada', 5, 'finished')");
+    const auto read_it = [&](Database::Mode mode) {
+        Index index(path_, mode);
+        EXPECT_EQ(index.database().version(), newest_version());
+        EXPECT_THAT(index.without_result(), ElementsAre("one"));
+        for (const char* end : {"-wal", "-shm", "-journal"})
+            EXPECT_FALSE(fs::exists(path_ + end)) << end;
+    };
+    read_it(Database::Mode::read);
+    // THEN what is noted in a copy goes with it
+    {
+        Index copy(path_, Database::Mode::copy);
+        copy.put(entry_of("17", 1), true);
+        EXPECT_EQ(copy.campaigns({}).size(), 2U);
+    }
+    read_it(Database::Mode::copy);
+    // THEN what a recorder writes meanwhile is seen by whoever comes then
+    journal::Database recorder(path_);
+    recorder.execute("INSERT INTO campaign VALUES ('two', 'second', 'Ada', 6, 'finished')");
+    EXPECT_THAT(Index(path_, Database::Mode::read).without_result(), ElementsAre("one", "two"));
+}
+
+TEST_F(ArchiveIndex, ADamagedOneIsNamedWithWhatMakesItAnew) {
+    { Index index(path_, Database::Mode::write); }
+    const auto size = fs::file_size(path_);
+    const auto refused = [&](Database::Mode mode) {
+        try {
+            static_cast<void>(Index(path_, mode).campaigns({}));
+        } catch (const ArchiveError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    const std::string anew = "vibrig archive add " + folder_ + " --archive " + folder_;
+    fs::resize_file(path_, size / 4);
+    for (const auto mode : {Database::Mode::read, Database::Mode::write}) {
+        EXPECT_THAT(refused(mode), HasSubstr(path_ + ": is damaged: a part of it is missing"));
+        EXPECT_THAT(refused(mode), HasSubstr(anew));
+    }
+    std::ofstream(path_) << std::string(8192, 'x');
+    for (const auto mode : {Database::Mode::read, Database::Mode::write}) {
+        EXPECT_THAT(refused(mode), HasSubstr(path_ + ": is damaged: it does not begin as"));
+        EXPECT_THAT(refused(mode), HasSubstr(anew));
+    }
+    fs::resize_file(path_, 0);
+    EXPECT_THAT(refused(Database::Mode::read), HasSubstr("found an empty file"));
+    EXPECT_THAT(refused(Database::Mode::read), HasSubstr(anew));
+    EXPECT_EQ(refused(Database::Mode::write), "");  // a new one
+}
+
 TEST_F(ArchiveIndex, GivesBackWhatItWasGiven) {
     Entry one = entry_of("17", 1, -1.25e-7, 3e-9);
     one.coefficients[4].reset();
@@ -220,6 +276,18 @@ TEST_F(ArchiveIndex, ADamagedCopyIsNamedAsWhatItIs) {
     std::ofstream(file) << "0123456789";
     std::ofstream(fs::path(folder_) / "report.html") << "x";
     EXPECT_EQ(campaign_hash(list_files(folder_)), hash);
+}
+
+TEST(ArchiveManifest, ANameThatIsNotUtf8IsRefusedByName) {
+    Entry one = entry_of("17", 1);
+    one.files = {{"campaign.h5", 1, "abc"}, {"x\xff.txt", 1, "def"}};
+    try {
+        static_cast<void>(manifest_json(one, "/rec/one"));
+        FAIL() << "it was written";
+    } catch (const ArchiveError& error) {
+        EXPECT_STREQ(error.what(),
+                     "/rec/one: found a file \"x\\ufffd.txt\", expected a name in UTF-8");
+    }
 }
 
 TEST(ArchiveDatabase, ShowsNoPassword) {

@@ -16,6 +16,23 @@
 namespace vibrig::record {
 namespace {
 
+TEST_F(Parts, AreFoundInAnIndexThatWasCutToNothing) {
+    write(head(1), 10 * kSecond, {1}, 1, "finished");
+    std::vector<std::string> reported;
+    const auto tell = [&reported](const std::string& words) { reported.push_back(words); };
+    // One that is not there yet is not empty.
+    EXPECT_TRUE(Index(recordings_.string(), tell).campaigns().empty());
+    EXPECT_TRUE(reported.empty());
+    const std::string path = Index::path_in(recordings_.string());
+    for (const char* end : {"", "-wal", "-shm"}) fs::remove(path + end);
+    std::ofstream(path).flush();
+    EXPECT_EQ(Index(recordings_.string(), tell).campaigns().size(), 1U);
+    ASSERT_EQ(reported.size(), 1U);
+    EXPECT_NE(reported[0].find("is empty: made anew from the files of 1 campaigns"),
+              std::string::npos)
+        << reported[0];
+}
+
 TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
     // GIVEN one campaign that is there, and many more in the index
     write(head(1), 10 * kSecond, {1}, 1, "finished");

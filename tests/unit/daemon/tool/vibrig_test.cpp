@@ -130,6 +130,106 @@ TEST_F(VibrigOptions, PkiSaysToMachinesWhatItMade) {
     EXPECT_THAT(content(revoked["list"]), testing::HasSubstr("X509 CRL"));
 }
 
+TEST_F(VibrigOptions, PkiLooksAtEveryNameBeforeItMakesAnything) {
+    const std::string long_name(65, 'x');
+    for (const auto& [arguments, words] :
+         {std::pair<std::string, std::string>{"--host 'a b'", "--host: found \"a b\", expected"},
+          {"--host rig.lab --host 'a,DNS:b'", "--host: found \"a,DNS:b\", expected"},
+          {"--host rig.lab --operator '\xff'", R"(--operator: found "\xff", expected a name, one)"},
+          {"--viewer 'a\nb'", R"(--viewer: found "a\nb", expected a name, one line)"},
+          {"--operator server", "--operator: found \"server\", expected another name"},
+          {"--admin ../x", "--admin: found \"../x\", expected a name without '/'"},
+          {"--admin " + long_name, "expected a name of 64 characters at most"},
+          {"--viewer ada --operator ada", "--operator: found \"ada\" a second time, expected"}}) {
+        expect_refusal("pki init --folder p " + arguments, words);
+        EXPECT_FALSE(std::filesystem::exists(folder_ / "p")) << arguments;
+    }
+    write("file", "");
+    expect_refusal("pki init --folder file/p --viewer wall",
+                   "--folder: found \"file/p\", expected");
+    // AND a list of revoked ones is as careful
+    EXPECT_EQ(vibrig("pki init --folder q"), 0) << error;
+    expect_refusal("pki revoke --folder q '\xff'", R"(name: found "\xff", expected somebody's)");
+    // AND neither a long host, nor an address, nor another script is in the way
+    const std::string host = std::string(60, 'h') + ".a-long-name.lab";
+    EXPECT_EQ(vibrig("pki init --folder p --host ::1 --host " + host + " --viewer 'Åsa Ek'"), 0)
+        << error;
+}
+
+TEST_F(VibrigOptions, PkiLeavesTheServersCertificateAlone) {
+    // GIVEN a server's certificate
+    ASSERT_EQ(vibrig("pki init --folder p --host rig.lab --host 10.0.0.5"), 0) << error;
+    const auto certificate = content("p/server.crt"), key = content("p/server.key");
+    // WHEN people come later with hosts that it names THEN it stays
+    ASSERT_EQ(vibrig("pki init --json --folder p --host 10.0.0.5 --viewer wall"), 0) << error;
+    EXPECT_EQ(nlohmann::json::parse(out)["server"]["is_new"], false);
+    // AND another host is refused, with nothing made
+    for (const char* const host : {"10.0.0.6", "a.rig.lab"})
+        expect_refusal(
+            "pki init --folder p --operator ada --host rig.lab --host " + std::string(host),
+            "does not name \"" + std::string(host) + "\"; nothing was changed");
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "p/ada.key"));
+    EXPECT_EQ(content("p/server.crt"), certificate);
+    EXPECT_EQ(content("p/server.key"), key);
+    // AND neither is one without its key, or of another authority, replaced
+    std::filesystem::rename(folder_ / "p/server.key", folder_ / "kept");
+    expect_refusal("pki init --folder p --host rig.lab", "has no p/server.key beside it");
+    ASSERT_EQ(vibrig("pki init --folder q"), 0);
+    write("q/server.crt", certificate);
+    write("q/server.key", key);
+    expect_refusal("pki init --folder q --host rig.lab", "comes from another authority");
+    // AND where it was moved away there is a new one
+    std::filesystem::remove(folder_ / "p/server.crt");
+    ASSERT_EQ(vibrig("pki init --folder p --host 10.0.0.6"), 0) << error;
+    EXPECT_NE(content("p/server.crt"), certificate);
+}
+
+TEST_F(VibrigOptions, ACertificatesPaperIsHeldToDatesAndLimits) {
+    // GIVEN a paper that is well but for one thing; no campaign: it is read before
+    const std::string head = "number = \"C-1\"\nlaboratory.name = \"L\"\ncustomer.name = \"C\"\n";
+    const std::string limit = "[[limit]]\ncoefficient = \"D_Fx\"\nhigh = 2\n";
+    for (const auto& [more, words] :
+         {std::pair<std::string, std::string>{
+              "item.received = \"yesterday\"\n",
+              "p.toml:4: received: found \"yesterday\", expected a date such as 20"},
+          {"item.received = 9999-11-20\n",
+           "p.toml:4: received: found 9999-11-20, expected none after the day of issue (UTC), 20"},
+          {"item.received = 7\n", "p.toml:4: received: found 7, expected a date such as 20"},
+          {limit + limit, "p.toml:7: limit: found coefficient \"D_Fx\" a second time, expected"},
+          {"item.received = 2026-03-01\n" + limit, "nosuch"}}) {
+        write("p.toml", head + more);
+        expect_refusal("certificate nosuch --paper p.toml --by A --no-journal", words);
+    }
+    for (const char* const name : {"a\nb", "\xff"})
+        expect_refusal(
+            std::string("certificate nosuch --paper p.toml --no-journal --by '") + name + '\'',
+            "expected a name, one line of UTF-8 without control characters");
+}
+
+TEST_F(VibrigOptions, CommissioningNamesWhatItCannotTake) {
+    std::filesystem::create_directories(folder_ / "folder");
+    expect_refusal("commission --by A --answers folder",
+                   "vibrig commission: folder: cannot be read: Is a directory");
+    expect_refusal("commission accept --bus --by A --second B --config folder",
+                   "vibrig commission: folder: cannot be read: Is a directory");
+    for (const char* const baud : {"0", "-5"})
+        expect_refusal("commission registers --by A --device /dev/null --baud " + std::string(baud),
+                       "--baud: Value " + std::string(baud) + " not in range 300 to 4000000");
+}
+
+TEST_F(VibrigOptions, TheDaemonSaysWhenNobodyCanReadWhatItPrints) {
+    write("rig.toml", "clock.source = \"rig\"\ncan.port = \"seqpacket\"\ncan.path = \"@rig\"\n");
+    EXPECT_EQ(run(VIBRIGD, "--config rig.toml --check"), 0) << error;
+    for (const char* const arguments : {"--config rig.toml --check", "--schema", "--init",
+                                        "--print-proto", "--help", "--version"}) {
+        for (const char* const nowhere : {" >/dev/full", " >&-"}) {
+            EXPECT_EQ(run(VIBRIGD, std::string(arguments) + nowhere), 2) << arguments << nowhere;
+            EXPECT_NE(error.find("vibrigd: standard output: cannot be written"), std::string::npos)
+                << arguments << nowhere << error;
+        }
+    }
+}
+
 TEST_F(VibrigOptions, JsonHasATextThatIsNoUtf8) {
     // GIVEN a folder whose name is Latin-1
     ASSERT_EQ(vibrig("pki init --json --folder 'caf\351'"), 0) << error;

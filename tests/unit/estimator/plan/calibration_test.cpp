@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "tests/unit/estimator/plan/calibration_readings.hpp"
 
 namespace vibrig::estimator::plan {
@@ -77,6 +79,20 @@ TEST(Calibration, BadReadingsAreRefused) {
     EXPECT_NE(why(bad).find("reading 6: found sigma 0"), std::string::npos);
     bad[5].sigma = kNaN;
     EXPECT_NE(why(bad).find("reading 6"), std::string::npos);
+    // What overflows when it is squared on the way is no better than what is not finite
+    bad = list;
+    bad[3].input[1] = 1e78;
+    EXPECT_NE(why(bad).find("reading 4: input: found 1e+78, expected a number from -1e+12"),
+              std::string::npos)
+        << why(bad);
+    bad = list;
+    bad[3].output = -1e300;
+    EXPECT_NE(why(bad).find("reading 4: output: found -1e+300"), std::string::npos) << why(bad);
+    for (const double sigma : {1e-155, 1e300}) {
+        bad = list;
+        bad[5].sigma = sigma;
+        EXPECT_NE(why(bad).find("reading 6: found sigma 1e"), std::string::npos) << why(bad);
+    }
     // As many readings as coefficients: a solution, nothing to judge it by
     Terms line{};
     line[0] = line[1] = true;
@@ -85,6 +101,32 @@ TEST(Calibration, BadReadingsAreRefused) {
     EXPECT_NEAR(c.value[1], 3, 1e-12);
     EXPECT_TRUE(std::isnan(c.sigma[1]));
     EXPECT_FALSE(c.test);
+}
+
+TEST(Calibration, InputsThatExciteNoTermAreRefused) {
+    Terms line{};
+    line[1] = true;
+    EXPECT_THROW(static_cast<void>(calibrate({{{0, 0, 0}, -2, 0}, {{0, 0, 0}, 4, 0}}, line)),
+                 PlanError);
+}
+
+TEST(LinearAlgebra, WhatIsNotFiniteIsRefusedByPivotedColumns) {
+    // Eigen reads out of bounds where the size of no column is a number
+    using linear_algebra::Matrix;
+    for (const double bad : {kNaN, std::numeric_limits<double>::infinity(), 1e200}) {
+        Matrix a = Matrix::Identity(4, 3);
+        a(2, 1) = bad;
+        const Matrix b = Matrix::Ones(4, 1);
+        EXPECT_THROW(static_cast<void>(linear_algebra::least_squares(a, b)), std::domain_error);
+        EXPECT_THROW(static_cast<void>(linear_algebra::right_singular(a)), std::domain_error);
+        EXPECT_THROW(static_cast<void>(linear_algebra::orthogonal_factor(a)), std::domain_error);
+        EXPECT_THROW(static_cast<void>(linear_algebra::rank(a, 1e-9)), std::domain_error);
+    }
+    EXPECT_THROW(static_cast<void>(linear_algebra::least_squares(Matrix::Identity(4, 3),
+                                                                 Matrix::Constant(4, 1, kNaN))),
+                 std::domain_error);
+    EXPECT_NEAR(linear_algebra::least_squares(Matrix::Identity(4, 3), Matrix::Ones(4, 1)).sum(), 3,
+                1e-12);
 }
 
 }  // namespace

@@ -27,6 +27,18 @@ using estimator::plan::readings;
 using estimator::plan::Vec3;
 using Json = nlohmann::json;
 
+std::string csv_row(const std::vector<double>& numbers) {
+    std::ostringstream text;
+    text.precision(17);
+    for (std::size_t i = 0; i < numbers.size(); ++i) text << (i > 0 ? "," : "") << numbers[i];
+    return text.str() + '\n';
+}
+std::string many(const std::string& row, int count) {
+    std::string text;
+    for (int i = 0; i < count; ++i) text += row;
+    return text;
+}
+
 class CalibrateCommand : public vibrig::test::VibrigCommand {
   protected:
     using VibrigCommand::write;
@@ -111,6 +123,22 @@ TEST_F(CalibrateCommand, TurntablePlansAreThePapers) {
     EXPECT_NE(error.find("rank 9 of 10"), std::string::npos) << error;
 }
 
+TEST_F(CalibrateCommand, TheLargestAndSmallestNumbersGiveNumbers) {
+    // GIVEN sigmas and a reading at the very limits
+    write("fine.csv", readings({1, 2}, 2, 3, true));
+    std::vector<Reading> far = readings({1, 2}, 2, 3, true);
+    far.push_back({{1e12, -1e12, 1e12}, 1e30, 0});
+    write("far.csv", far);
+    for (const char* arguments : {"fine.csv --sigma 1e-30", "fine.csv --sigma 1e30",
+                                  "far.csv --sigma 1e-30", "far.csv --sigma 1e30", "far.csv"}) {
+        // THEN there is a result, and what is printed is a number or null
+        const int code = vibrig(std::string("calibrate --json ") + arguments);
+        EXPECT_TRUE(code == 0 || code == 1) << arguments << ": " << code << error;
+        EXPECT_TRUE(Json::accept(out)) << arguments << out;
+        EXPECT_EQ((out + error).find("nan"), std::string::npos) << arguments << out << error;
+    }
+}
+
 TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
     write("empty.csv", "");
     write("header.csv", "x1,x2,x3,y\n");
@@ -121,6 +149,18 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
     write("few.csv", "x1,x2,x3,y\n1,0,0,1\n");
     write("sigma.csv", "x1,x2,x3,y,sigma\n1,0,0,1,-2\n");
     write("count.csv", "x1,x2,x3,y,count\n1,0,0,1,4\n");
+    write("still.csv", "x1,x2,x3,y\n" + many("0,0,0,1\n", 12));
+    // What overflows on the way to a result: one line of it crashed.
+    std::string good = "x1,x2,x3,y,sigma,count\n";
+    for (const Reading& r : readings({1, 2}, 2, 3, true))
+        good += csv_row({r.input[0], r.input[1], r.input[2], r.output, 2e-6, 1});
+    write("x.csv", good + "1e78,0,0,1,2e-6,1\n");
+    write("x3.csv", good + "0,0,-1e154,1,2e-6,1\n");
+    write("y.csv", good + "1,0,0,1e300,2e-6,1\n");
+    write("small.csv", good + "1,0,0,1,1e-155,1\n");
+    write("large.csv", good + "1,0,0,1,1e300,1\n");
+    write("mean.csv", good + "1,0,0,1,2e-6,1e300\n");
+    write("fine.csv", readings({1, 2}, 2, 3, true));
     struct Case {
         const char* arguments;
         const char* words;
@@ -138,6 +178,21 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"calibrate sigma.csv --sigma 1", "--sigma and a column sigma"},
           Case{"calibrate count.csv", "count.csv:2: column count"},
           Case{"calibrate few.csv --sigma nan", "--sigma"},
+          Case{"calibrate fine.csv --sigma 1e-153",
+               "--sigma: found 1e-153, expected a finite number from 1e-30 up to 1e+30"},
+          Case{"calibrate fine.csv --sigma 1e-308", "expected a finite number from 1e-30"},
+          Case{"calibrate fine.csv --sigma 1e308", "--sigma: found 1e308"},
+          Case{"calibrate x.csv",
+               "x.csv:106: column x1: found 1e+78, expected a number from -1e+12 to 1e+12"},
+          Case{"calibrate x3.csv", "x3.csv:106: column x3: found -1e+154"},
+          Case{"calibrate y.csv",
+               "y.csv:106: column y: found 1e+300, expected a number from -1e+30 to 1e+30"},
+          Case{"calibrate small.csv",
+               "small.csv:106: column sigma: found 1e-155, expected a number from 1e-30 to 1e+30"},
+          Case{"calibrate large.csv", "large.csv:106: column sigma: found 1e+300"},
+          Case{"calibrate mean.csv",
+               "mean.csv:106: column count: found 1e+300, expected a number from 1 to 1e+12"},
+          Case{"calibrate still.csv --without D0", "still.csv: found inputs of 0 alone"},
           Case{"calibrate few.csv --without D9", "--without: found \"D9\""},
           Case{"plan --turntable --spheres 2,1", "--spheres: found 1"},
           Case{"plan --turntable --spheres 0,1", "--spheres"},
@@ -145,6 +200,9 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"plan --turntable --runs 9", "9 runs for 10 coefficients"},
           Case{"plan --turntable --spheres 1,2,3 --allocation both", "--allocation: found both"},
           Case{"plan --turntable --levels 0,6", "--levels"},
+          Case{"plan --turntable --outer 0,6", "--outer"},
+          Case{"plan --turntable --noise-per-g 1", "--noise-per-g"},
+          Case{"plan --turntable --order random", "--order"},
           Case{"plan --spheres 1,2", "--turntable"}}) {
         EXPECT_EQ(vibrig(c.arguments), 2) << c.arguments << out << error;
         EXPECT_NE(error.find(c.words), std::string::npos) << c.arguments << ": " << error;

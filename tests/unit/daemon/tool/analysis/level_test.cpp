@@ -109,6 +109,11 @@ TEST_F(LevelCommand, RefusesBadInput) {
     expect_refusal("level", "subcommand");
     expect_refusal("level simulate --step 2", "--step: found 2 without --step-at");
     expect_refusal("level simulate --step-at 2", "--step");
+    // No option is taken and left aside.
+    expect_refusal("level simulate --runs 5 --plot x.svg", "--plot: found x.svg with --runs 5");
+    expect_refusal("level simulate --runs 5 --step 2 --step-at 9",
+                   "--step-at: found 9 with --runs 5");
+    expect_refusal("level simulate --ramp 9", "--slow");
     expect_refusal("level design --settling 1e7", "--settling: 3e+07 s are 3e+08 samples");
     // What is no number passes no option, and the one line names it.
     for (const char* option :

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "tests/unit/support/vibrig_command.hpp"
 
@@ -122,6 +124,55 @@ TEST_F(ZeroCommand, RefusesBadInput) {
         expect_refusal(std::string("zero simulate ") + option + "=1,nan,1",
                        std::string(option) + ": found nan, expected a finite number");
     }
+}
+
+TEST_F(ZeroCommand, RefusesAFileThatIsNoneWithItsLine) {
+    const std::string header =
+        "time_s,turn_x_arcsec,turn_y_arcsec,turn_z_arcsec,dv_x_mps,dv_y_mps,dv_z_mps,azimuth_deg\n";
+    const auto rows = [&](const std::vector<std::string>& times) {
+        std::string text = "# a comment\n" + header;
+        for (const std::string& time : times) text += time + ",0,0,0,0,0,0.098,0\n";
+        return text;
+    };
+    write("header.csv", header);
+    write("nan.csv", rows({"0", "0.01", "nan"}));
+    write("none.csv", rows({"", "0.01"}));
+    write("twice.csv", rows({"0", "0.01", "0.01", "0.02"}));
+    write("back.csv", rows({"0", "0.02", "0.01"}));
+    write("far.csv", rows({"1e300", "2e300"}));
+    write("days.csv", rows({"0", "0.01", "1e6"}));
+    write("short.csv", rows({"0", "0.01", "0.02"}));
+    write("turn.csv", header + "0,0,0,0,0,0,0,0\n0.01,0,1e300,0,0,0,0,0\n");
+    write("gaps.csv", header +
+                          "0,0,0,0,0,0,0,0\n0.01,,0,0,0,0,0,0\n0.02,,0,0,0,0,0,0\n"
+                          "0.03,,0,0,0,0,0,0\n0.04,,0,0,0,0,0,0\n");
+    expect_refusal("zero header.csv", "header.csv: found no row after the header");
+    expect_refusal("zero nan.csv", "nan.csv:5: column time_s: found no number, expected s from");
+    expect_refusal("zero none.csv", "none.csv:3: column time_s: found no number");
+    expect_refusal("zero twice.csv",
+                   "twice.csv:5: column time_s: found 0.01, expected more than 0.01 of the row");
+    expect_refusal("zero back.csv",
+                   "back.csv:5: column time_s: found 0.01, expected more than 0.02 of the row");
+    expect_refusal("zero far.csv",
+                   "far.csv:3: column time_s: found 1e+300, expected s from -1e+12 to 1e+12");
+    expect_refusal("zero days.csv", "days.csv:5: column time_s: found 1000000, expected at most");
+    expect_refusal("zero short.csv", "short.csv: found increments of 0.02 s, expected 1 s or more");
+    expect_refusal("zero turn.csv", "turn.csv:3: column turn_y_arcsec: found 1e+300");
+    expect_refusal("zero gaps.csv", "gaps.csv: given up: more than 3 gaps");
+    EXPECT_EQ(out, "") << "zeros that nobody found";
+}
+
+TEST_F(ZeroCommand, NoOptionIsTakenAndLeftAside) {
+    expect_refusal("zero z.csv simulate", "zero: found z.csv with `simulate`");
+    expect_refusal("zero --down z.csv simulate", "--down: found it with `simulate`");
+    expect_refusal("zero --azimuth none simulate", "--azimuth: found it with `simulate`");
+    for (const char* option : {"--json", "--plot x.svg", "--both-ways", "--second-axis"}) {
+        const std::string asked = option;
+        expect_refusal("zero simulate --write run.csv " + asked,
+                       asked.substr(0, asked.find(' ')) + ": found it with --write");
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "run.csv"));
+    expect_refusal("zero simulate --both-ways --inverted", "--both-ways: found it with --inverted");
 }
 
 TEST_F(ZeroCommand, ReproducesTheTable) {

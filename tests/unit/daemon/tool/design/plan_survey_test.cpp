@@ -120,6 +120,9 @@ TEST_F(SurveyCommand, BadInputIsNamed) {
         {"plan --frequencies 15,15.1 --mount hard", "2 % above"},
         {"plan --mount hard", "--frequencies, --highest, --profile, --sweeps or --about with it"},
         {"plan --frequencies 15,nan", "expected a finite number"},
+        {"plan --frequencies 15,35 --attitude 1,2,3", "--attitude"},
+        {"plan --frequencies 15,35 --outer -1,1", "--outer"},
+        {"plan --frequencies 15,35 --forbidden p.csv", "--forbidden"},
         {"plan --frequencies 15,35 --evaluate plan.json", "--evaluate"}};
     for (const auto& [arguments, words] : refusals) {
         EXPECT_EQ(vibrig(arguments), 2) << arguments;

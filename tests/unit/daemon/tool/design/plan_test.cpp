@@ -208,6 +208,10 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"--levels 0,6 --config limit.toml", "shaker.limits.acceleration_g"},
           Case{"--inner 30,20", "gimbal limits"},
           Case{"--outer 1,2 --azimuth 1,2", "leave no position"},
+          Case{"--grid 30 --positions lock.csv", "--grid"},
+          Case{"--forbidden-within 5", "--forbidden"},
+          Case{"--block 4", "--block"},
+          Case{"--block 4 --order balanced", "found --block with --order balanced"},
           Case{"--without D99", "--without: found \"D99\""}}) {
         EXPECT_EQ(vibrig(std::string("plan ") + c.arguments), 2) << c.arguments << out << error;
         EXPECT_NE(error.find(c.words), std::string::npos) << c.arguments << ": " << error;

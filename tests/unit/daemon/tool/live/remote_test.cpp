@@ -103,6 +103,33 @@ TEST_F(Tool, SendsCommandsAndReportsRefusals) {
     EXPECT_EQ(source.requests().size(), 7u);
 }
 
+TEST_F(Tool, WhatTheDaemonWouldRefuseIsRefusedBefore) {
+    // GIVEN a daemon, and names that are no line of UTF-8
+    const StatusServer server(source, path);
+    const struct {
+        const char *arguments, *words;
+    } lines[] = {
+        {"arm --by '\xff\xfe'", R"(--by: found "\xff\xfe", expected a name, one line of UTF-8)"},
+        {"start --by 'a\nb'", R"(--by: found "a\nb", expected a name, one line of UTF-8)"},
+        {"abort --by '  '", R"(--by: found "  ", expected a name)"},
+        {"ack '\xff'", R"(what: found "\xff", expected what `vibrig status` names)"},
+        {"selftest --by '\xff'", R"(--by: found "\xff", expected a name)"},
+        {"commission gyros --by '\xff' --second Bo", R"(--by: found "\xff", expected a name)"},
+        {"commission gyros --by Ada --second '\xff'", R"(--second: found "\xff", expected a name)"},
+        {"commission accept --by '\xff' --second Bo", R"(--by: found "\xff", expected a name)"},
+    };
+    for (const auto& [arguments, words] : lines) {
+        // WHEN they command THEN the tool says so, and the daemon never hears of it
+        const Outcome outcome = vibrig(arguments + at);
+        EXPECT_EQ(outcome.code, 2) << arguments;
+        EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+        EXPECT_EQ(outcome.output.find("libprotobuf"), std::string::npos) << outcome.output;
+    }
+    EXPECT_TRUE(source.requests().empty());
+    // AND a name in another script is one
+    EXPECT_EQ(vibrig("arm --by 'Žofie Ångström'" + at).code, 0);
+}
+
 TEST_F(Tool, WatchesUntilTheCampaignEnds) {
     const StatusServer server(source, path);
     StatusData status = full_status();
