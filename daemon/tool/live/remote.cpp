@@ -234,7 +234,10 @@ void add_order(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char
             ->capture_default_str();
     // A stop does not wait for a better name.
     if (kind == v1::Command::abort)
-        by->transform([](const std::string& text) { return proto::printable(text, text.size()); });
+        by->transform([](const std::string& text) {
+            const bool blank = text.find_first_not_of(' ') == std::string::npos;
+            return blank && !text.empty() ? "somebody" : proto::printable(text, text.size());
+        });
     else
         by->check(one_line("a name"));
     command.add_flag("--json", options.json, "Print the daemon's answer as JSON");
