@@ -218,7 +218,6 @@ def sick_disks(checks, rig, folder):
 
 def armed_while_the_disk_takes_its_time(checks, rig, folder):
     """What comes between an arming that is asked for and its being on disk counts: armed is who is fit then."""
-    os.mkdir(folder)
     disk = disks.SickDisk(folder)
     if disk.refused:
         checks.skip("an arming on a slow disk", disk.refused)
@@ -265,8 +264,10 @@ def main():
                 part(checks, rig)
                 shutil.rmtree(rig.results)
                 os.mkdir(rig.results)
-            sick_disks(checks, rig, folder)
-            armed_while_the_disk_takes_its_time(checks, rig, os.path.join(folder, "slow"))
+            for name, part in (("sick", sick_disks), ("slow", armed_while_the_disk_takes_its_time)):
+                own = os.path.join(folder, name)   # the rig's control lies in the other one
+                os.mkdir(own)
+                part(checks, rig, own)
         finally:
             rig.stop()
     checks.note(f"{time.monotonic() - begun:.0f} s")
