@@ -106,7 +106,7 @@ def campaign(checks, rig, folder, may_repeat):
     refused = rig.tool("start", "--by", "tester")
     checks.check(refused.returncode == 1, "start is refused while nobody has armed the shaker",
                  f"status {refused.returncode}: {refused.stdout}{refused.stderr}")
-    armed = rig.tool("arm", "--by", "tester")
+    armed = rig.arm()
     checks.check(armed.returncode == 0, "a named person arms the shaker", armed.stderr)
     started = rig.tool("start", "--by", "tester")
     checks.check(started.returncode == 0, "the campaign starts", started.stderr)
@@ -211,7 +211,7 @@ def shaker_registers(port):
 
 def run_up(checks, rig, text):
     """A campaign until the shaker runs at its level."""
-    accepted = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+    accepted = [rig.arm(), rig.tool("start", "--by", "tester")]
     status = rig.wait_for(lambda s: s["shaker"].get("measured_g", 0) > 5 and
                           s["campaign"]["state"] in ("settling", "recording"), 60)
     return checks.check(status is not None and status["shaker"].get("measured_g", 0) > 5, text,
