@@ -189,16 +189,29 @@ def crowd(checks, rig):
     checks.equal(rig.daemon.end(timeout=30), 0, "crowd: it ends cleanly")
 
 
-def sick_disks(checks, rig, folder):
+@contextlib.contextmanager
+def recording_on(checks, rig, folder, what, **environment):
+    """The daemon, with results and recordings on a disk that can be made ill; None where there is none to be had."""
+    os.mkdir(folder)   # not the rig's own, in which its control lies
     disk = disks.SickDisk(folder)
     if disk.refused:
-        checks.skip("an abort on a sick disk", disk.refused)
+        checks.skip(what, disk.refused)
+        yield None
         return
     try:
         disk.remount("rw")
         rig.results = disk.folder
         rig.configure(CAMPAIGN, record={"folder": disk.folder, "segment_s": 3.0, "keep_free_mb": 0, "flush_s": 0.5}, **r.PATIENT)
-        start(rig, disk.environment())
+        start(rig, {**disk.environment(), **environment})
+        yield disk
+    finally:
+        disk.end()
+
+
+def sick_disks(checks, rig, folder):
+    with recording_on(checks, rig, folder, "an abort on a sick disk") as disk:
+        if disk is None:
+            return
         for what, ill, well in (("disk full", disk.fill, disk.make_room), ("disk slow", lambda: disk.set("s"), lambda: disk.set("-")),
                                 ("disk of 1 MB/s", lambda: disk.set("t"), lambda: disk.set("-")),
                                 ("disk dead", lambda: disk.set("e"), lambda: disk.set("-"))):
@@ -212,21 +225,14 @@ def sick_disks(checks, rig, folder):
             stops(checks, rig, what)
             well()
         checks.check(rig.daemon.end(timeout=60) in (0, 1), "sick disks: it ends")
-    finally:
-        disk.end()
 
 
 def armed_while_the_disk_takes_its_time(checks, rig, folder):
     """What comes between an arming that is asked for and its being on disk counts: armed is who is fit then."""
-    disk = disks.SickDisk(folder)
-    if disk.refused:
-        checks.skip("an arming on a slow disk", disk.refused)
-        return
-    try:
-        disk.remount("rw")
-        rig.results = disk.folder
-        rig.configure(CAMPAIGN, record={"folder": disk.folder, "segment_s": 3.0, "keep_free_mb": 0, "flush_s": 0.5}, **r.PATIENT)
-        start(rig, {**disk.environment(), "SICK_SECONDS": "1"})   # the daemon's patience is 2 s
+    # The daemon's patience is 2 s.
+    with recording_on(checks, rig, folder, "an arming on a slow disk", SICK_SECONDS="1") as disk:
+        if disk is None:
+            return
         rig.wait_for(lambda t: t["shaker"].get("rest") == "at rest" and t["journal"].get("verified"), 30)
         disk.set("s")
         with subprocess.Popen([rig.program("vibrig"), "arm", "--by", "Ada", "--socket", rig.socket], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -245,8 +251,6 @@ def armed_while_the_disk_takes_its_time(checks, rig, folder):
         checks.equal([each for each in what if each in ("armed", "disarmed")], ["armed", "disarmed"], "and the journal says so")
         rig.order("estop close")
         rig.order("clear")
-    finally:
-        disk.end()
 
 
 def main():
@@ -265,9 +269,7 @@ def main():
                 shutil.rmtree(rig.results)
                 os.mkdir(rig.results)
             for name, part in (("sick", sick_disks), ("slow", armed_while_the_disk_takes_its_time)):
-                own = os.path.join(folder, name)   # the rig's control lies in the other one
-                os.mkdir(own)
-                part(checks, rig, own)
+                part(checks, rig, os.path.join(folder, name))
         finally:
             rig.stop()
     checks.note(f"{time.monotonic() - begun:.0f} s")
