@@ -29,7 +29,7 @@ WriterLock::~WriterLock() {
 }
 
 bool WriterLock::held(const std::string& path) {
-    const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);  // who only asks need not write
     if (file < 0) return false;
     auto lock = whole_file();
     const bool asked = ::fcntl(file, F_OFD_GETLK, &lock) == 0;
