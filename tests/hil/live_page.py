@@ -438,6 +438,7 @@ def check_page(checks, rig, page, address, remote, pki):
     rig.daemon.end()
     until("a lost link is said loudly", "!document.getElementById('alert').hidden && document.getElementById('alert').textContent.startsWith('LINK LOST')")
     page.ask("shot", file=os.path.join(SHOTS, "link-lost.png"), width=1400, height=1000, scheme="light")
+    check_accessible(checks, page, "while the link is lost")
     rig.start_daemon()
     until("the page finds the restarted daemon by itself", "document.getElementById('alert').hidden && " + state + " !== 'recording'", 40)
     start_campaign(checks, rig, "another campaign starts")
