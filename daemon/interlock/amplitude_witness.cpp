@@ -20,7 +20,9 @@ constexpr double kFewestTurns = 0.5;
 constexpr int kFewestSamples = 8;
 // What is wrong is so for this long: with the window, half a second at most.
 constexpr Time kWrongFor = 150 * drivers::kMillisecond;
-constexpr double kStuckCounts = 20;  // of expected vibration
+constexpr Time kLeastSamplesUnknown = 6;  // where they come slowly: one that is lost is no more
+constexpr double kFromAlias_hz = 0.05;    // nearer to zero or half the rate nobody could know
+constexpr double kStuckCounts = 20;       // of expected vibration
 constexpr double kMovesCounts = 2;
 constexpr std::size_t kStuckBlocks = 4, kSuspectBlocks = 2;
 constexpr double kLevelShare = 0.04;  // sine of what an attitude may be off by
@@ -40,7 +42,8 @@ double dot(const Vector& a, const Vector& b) noexcept {
 double window_for(const AmplitudeWitness::Settings& s) {
     const double period = drivers::to_seconds(s.sample_period), half_rate = 0.5 / period;
     const double off = std::abs(std::remainder(s.frequency_hz, half_rate));
-    return std::max({kWindow_s, kFewestTurns / std::max(off, 0.05), kFewestSamples * period});
+    return std::max(
+        {kWindow_s, kFewestTurns / std::max(off, kFromAlias_hz), kFewestSamples * period});
 }
 
 /// True once it has been wrong for long enough; remembers since when.
@@ -137,8 +140,9 @@ bool AmplitudeWitness::blind() const noexcept {
 void AmplitudeWitness::begin() noexcept {
     force_.clear();
     table_.clear();
-    origin_ = newest_ = steady_since_ = 0;
+    origin_ = newest_ = steady_since_ = judged_at_ = 0;
     block_number_ = 0;
+    known_ = {};
     off_since_ = over_since_ = limit_since_ = {};
 }
 
@@ -146,7 +150,11 @@ bool AmplitudeWitness::add(const Sample& sample) noexcept {
     if (origin_ == 0 || sample.time < newest_) {  // a device that has started anew
         begin();
         origin_ = sample.time;
+        known_.fill(origin_);
     }
+    bound_ = {!std::any_of(sample.quality.begin() + 3, sample.quality.begin() + 6,
+                           [](Quality each) { return each == Quality::unbound; }),
+              sample.of(Channel::table_accel) != Quality::unbound};
     newest_ = sample.time;
     const std::int64_t number = (sample.time - origin_) / block_;
     const bool complete = number != block_number_;
@@ -154,6 +162,7 @@ bool AmplitudeWitness::add(const Sample& sample) noexcept {
         if (number - block_number_ > static_cast<std::int64_t>(LockIn<1>::kBlocks)) {
             force_.clear();
             table_.clear();
+            known_.fill(sample.time);  // of silence its age tells
         }
         for (; block_number_ < number &&
                number - block_number_ <= static_cast<std::int64_t>(LockIn<1>::kBlocks);
@@ -217,34 +226,65 @@ AmplitudeWitness::Verdict AmplitudeWitness::verdict(const Situation& now) noexce
     const auto suspect = look_for_stuck(now, low, verdict);
     const double platform = platform_g();
     verdict.seen_g = {platform < 0 ? -1 : platform / now.transmission, table_g()};
+    const Time since_before = judged_at_ == 0 ? 0 : newest_ - judged_at_;
+    std::array<bool, 2> shown_of{};
     for (std::size_t w = 0; w < 2; ++w) {
         const bool is_table = w == 1;
         const double seen = verdict.seen_g[w];
+        const bool shown = shown_of[w] = seen >= 0 || std::isnan(seen);
         const bool known = is_table || now.ramp.transmission_known;
         const double doubt = known ? kDecibel : 2;
         const auto [least, most] = bounds(now, known, low, high);
+        verdict.contradicts[w] = suspect[w];
         const auto judge = [&](Verdict::Finding& finding, bool wrong, Time& since) {
-            // A NaN is wrong.
+            // What is not known for a while is neither right nor wrong: that time does not count.
+            if (!shown && !blind()) {
+                if (since != 0) since += since_before;
+                return;
+            }
+            wrong = wrong && shown;  // a NaN is wrong
+            verdict.contradicts[w] = verdict.contradicts[w] || wrong;
             if (!lasting(wrong, since, newest_) || finding.wrong) return;
             finding = {true, is_table ? Channel::table_accel : Channel::accel_x, seen};
         };
-        const bool shown = seen >= 0 || std::isnan(seen);
         const double armed = now.ramp.armed_g;
-        judge(verdict.off_command, shown && !suspect[w] && !(seen >= least && seen <= most),
-              off_since_[w]);
+        judge(verdict.off_command, !suspect[w] && !(seen >= least && seen <= most), off_since_[w]);
         judge(verdict.over_armed,
-              shown && armed > 0 && !(seen <= std::max(armed * doubt, armed + kToleranceG)),
-              over_since_[w]);
-        judge(verdict.over_limit, shown && !(seen <= now.limit_g * (known ? 1 : doubt)),
-              limit_since_[w]);
+              armed > 0 && !(seen <= std::max(armed * doubt, armed + kToleranceG)), over_since_[w]);
+        judge(verdict.over_limit, !(seen <= now.limit_g * (known ? 1 : doubt)), limit_since_[w]);
     }
+    judged_at_ = newest_;
+    look_for_unknown(now, shown_of, verdict);
     return verdict;
 }
 
-AmplitudeWitness::Verdict::Finding AmplitudeWitness::stuck(const Situation& now) const noexcept {
+AmplitudeWitness::Verdict AmplitudeWitness::verdict_at_random(const Situation& now) noexcept {
     Verdict verdict;
-    static_cast<void>(look_for_stuck(now, now.steady ? now.ramp.target_g : 0, verdict));
-    return verdict.stuck;
+    verdict.contradicts = look_for_stuck(now, now.steady ? now.ramp.target_g : 0, verdict);
+    const auto enough = [this](std::size_t channel) {
+        return std::isfinite(range(channel, LockIn<1>::kBlocks));
+    };
+    look_for_unknown(now, {enough(0), enough(3)}, verdict);
+    return verdict;
+}
+
+/// Readings that are flagged, or beyond what they can show, are what an overload looks like.
+void AmplitudeWitness::look_for_unknown(const Situation& now, const std::array<bool, 2>& shown,
+                                        Verdict& verdict) noexcept {
+    const Time patience =
+        window_ + std::max(kWrongFor, kLeastSamplesUnknown * settings_.sample_period);
+    const double half_rate = 0.5 / drivers::to_seconds(settings_.sample_period);
+    const bool nobody_could =
+        now.ramp.random == 0 &&
+        (blind() || (!sweep_.any() &&
+                     std::abs(std::remainder(settings_.frequency_hz, half_rate)) < kFromAlias_hz));
+    for (std::size_t w = 0; w < 2; ++w) {
+        if (shown[w] || !bound_[w] || nobody_could) known_[w] = newest_;
+        if (newest_ - std::max(known_[w], now.ramp.begin + window_) <= patience) continue;
+        verdict.contradicts[w] = true;
+        if (!verdict.off_command.wrong)
+            verdict.off_command = {true, w == 1 ? Channel::table_accel : Channel::accel_x, -1};
+    }
 }
 
 double AmplitudeWitness::range(std::size_t channel, std::size_t blocks) const noexcept {

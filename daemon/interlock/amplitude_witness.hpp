@@ -67,11 +67,13 @@ class AmplitudeWitness {
         struct Finding {
             bool wrong = false;
             drivers::Channel channel = drivers::Channel::accel_x;
-            double value_g = 0;  ///< at the table
+            double value_g = 0;  ///< at the table; negative: not known, for too long
         };
         Finding off_command, over_armed, over_limit;
         Finding stuck;                         ///< value: the vibration expected of it, g
         std::array<double, 2> seen_g{-1, -1};  ///< platform, table; at the table; negative: unknown
+        /// Platform, table: whatever is wrong of it now, for however short a time.
+        std::array<bool, 2> contradicts{};
     };
     /// What holds at the moment of a judgement.
     struct Situation {
@@ -100,9 +102,9 @@ class AmplitudeWitness {
     /// True: a block is complete, and verdict() judges the newest.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
-    /// Whether an accelerometer does not move that should; all that is judged of random vibration,
-    /// whose peaks are beyond its rms.
-    [[nodiscard]] Verdict::Finding stuck(const Situation& situation) const noexcept;
+    /// Whether an accelerometer does not move that should, or has too few readings to be seen; all
+    /// that is judged of random vibration, whose peaks are beyond its rms.
+    [[nodiscard]] Verdict verdict_at_random(const Situation& situation) noexcept;
     [[nodiscard]] double window_s() const noexcept { return drivers::to_seconds(window_); }
 
   private:
@@ -111,6 +113,9 @@ class AmplitudeWitness {
     };
     [[nodiscard]] Bounds bounds(const Situation& now, bool known, double low, double high) const;
     void set_windows() noexcept;
+    /// Whose amplitude has not been known for too long, of those that there are.
+    void look_for_unknown(const Situation& now, const std::array<bool, 2>& shown,
+                          Verdict& verdict) noexcept;
     [[nodiscard]] double platform_g() const noexcept;
     [[nodiscard]] double table_g() const noexcept;
     /// Platform, table: true for one that does not move where another does; it will be named as
@@ -129,6 +134,9 @@ class AmplitudeWitness {
     drivers::Time origin_ = 0, newest_ = 0;
     std::int64_t block_number_ = 0;
     drivers::Time steady_since_ = 0;
+    drivers::Time judged_at_ = 0;           ///< newest sample of the judgement before
+    std::array<bool, 2> bound_{};           ///< platform, table: there is one
+    std::array<drivers::Time, 2> known_{};  ///< when its amplitude was known last
     std::array<drivers::Time, 2> off_since_{}, over_since_{}, limit_since_{};  ///< platform, table
 };
 

@@ -156,8 +156,8 @@ void Interlock::check(const drivers::Sample& sample,
         second_.publish(second);
     }
     if (guard == Guard::excitation) {
-        judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
-        judge(By::sample, Trip::platform_fault, platform.fault, now);
+        judge(By::sample, Trip::loop_open, !platform.loop_closed || platform.loop_was_open, now);
+        judge(By::sample, Trip::platform_fault, platform.fault || platform.had_fault, now);
         check_witnesses(sample);
         judge(By::sample, Trip::over_amplitude,
               verdict_.over_limit.wrong || table_beyond_limit(sample), now);
@@ -165,7 +165,8 @@ void Interlock::check(const drivers::Sample& sample,
         if (const double nis = nis_.load(); nis != 0)
             judge(By::sample, Trip::filter_divergence, nis, now);
     }
-    if (platform.time > 0) judge(By::sample, Trip::temperature, platform.temperature_c, now);
+    if (platform.temperature_time > 0)
+        judge(By::sample, Trip::temperature, platform.temperature_c, now);
     if (const double free_mb = disk_free_mb_.load(); free_mb >= 0)
         judge(By::sample, Trip::disk, free_mb, now);
     judge(By::sample, Trip::recording, recording_degraded_.load(), now);
@@ -173,15 +174,27 @@ void Interlock::check(const drivers::Sample& sample,
 }
 
 /// One reading of the table. Of random vibration single values go beyond three sigma all the time,
-/// to which its level was checked; beyond six hardly ever.
-bool Interlock::table_beyond_limit(const drivers::Sample& sample) const noexcept {
+/// to which its level was checked; beyond six hardly ever. One that is out of its range twice
+/// within a moment is an overload: once it may be a bit that fell over.
+bool Interlock::table_beyond_limit(const drivers::Sample& sample) noexcept {
     constexpr double kHardlyEver = 6.1;  // sigmas, once in 1e9
-    if (sample.of(Channel::table_accel) != drivers::Quality::good) return false;
+    const Time moment =
+        std::max(100 * drivers::kMillisecond, drivers::from_seconds(2.5 / rate_hz_));
     const double limit_g =
         at_random()
             ? std::max(table_g_, kHardlyEver * std::max(commanded_.start_g, commanded_.target_g))
             : table_g_;
-    return !(std::abs(sample.table_accel) <= limit_g);
+    const bool beyond = !(std::abs(sample.table_accel) <= limit_g);
+    const auto quality = sample.of(Channel::table_accel);
+    if (quality == drivers::Quality::good && beyond) return true;
+    // What is no number comes as 0. A peak of random vibration may be beyond a narrow range.
+    if (quality == drivers::Quality::out_of_range &&
+        (!at_random() || beyond || sample.table_accel == 0)) {
+        if (out_of_range_at_ != 0 && sample.time - out_of_range_at_ <= moment)
+            out_of_range_again_ = sample.time;
+        out_of_range_at_ = sample.time;
+    }
+    return out_of_range_again_ != 0 && sample.time - out_of_range_again_ <= moment;
 }
 
 void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
@@ -220,12 +233,13 @@ void Interlock::check_random(const drivers::Sample& sample) noexcept {
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(found.seen_g[i]);
     const bool complete = witness_.add(sample);
     if (proving_.load()) return;
-    judge(Trip::amplitude_witness, found.off_command, sample.time);
-    if (complete)
-        judge(Trip::stuck,
-              witness_.stuck({commanded_, controller_began_, sample.time, steady,
-                              commanded_transmission(), table_g_}),
-              sample.time);
+    if (complete) {
+        verdict_ = witness_.verdict_at_random({commanded_, controller_began_, sample.time, steady,
+                                               commanded_transmission(), table_g_});
+        judge(Trip::stuck, verdict_.stuck, sample.time);
+    }
+    judge(Trip::amplitude_witness,
+          found.off_command.wrong ? found.off_command : verdict_.off_command, sample.time);
 }
 
 void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
@@ -273,6 +287,7 @@ Guard Interlock::follow_guard() noexcept {
         witness_.begin();
         verdict_ = {};
         loss_ = {};
+        out_of_range_at_ = out_of_range_again_ = 0;
     }
     if ((guard == Guard::excitation) != (sampled_under_ == Guard::excitation))
         seconds_.begin(guard == Guard::excitation);
@@ -298,7 +313,7 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
         judge(By::sample, Trip::stale_platform, now - assembler.platform().time > platform_age_,
               now);
         const auto& counters = assembler.counters();
-        loss_.add(now, counters.samples, counters.incomplete, counters.gaps);
+        loss_.add(now, counters.samples, counters.incomplete + counters.invalid, counters.gaps);
         judge(By::sample, Trip::frame_loss, loss_.percent(), now);
     }
     // Of those outside, whether samples come or not.
@@ -378,10 +393,16 @@ std::string Interlock::text_of(const Tripped& tripped) const {
     }
     if (tripped.channel < drivers::kChannels) {
         const Ramp ramp = ramp_.read();
+        const char* who = channel == Channel::table_accel ? "table accelerometer" : "platform";
+        if (value < 0) {
+            std::snprintf(words.data(), words.size(),
+                          ": %s does not know the amplitude, %.3g g%s commanded", who,
+                          ramp.target_g, ramp.random > 0 ? " rms" : "");
+            return std::string(condition.text) + words.data();
+        }
         const bool armed = tripped.cause == Trip::over_armed;
-        std::snprintf(words.data(), words.size(), ": %s %.3g g%s at the table, %.3g g %s",
-                      channel == Channel::table_accel ? "table accelerometer" : "platform", value,
-                      ramp.random > 0 ? " rms" : "", armed ? ramp.armed_g : ramp.target_g,
+        std::snprintf(words.data(), words.size(), ": %s %.3g g%s at the table, %.3g g %s", who,
+                      value, ramp.random > 0 ? " rms" : "", armed ? ramp.armed_g : ramp.target_g,
                       armed ? "armed" : "commanded");
         return std::string(condition.text) + words.data();
     }

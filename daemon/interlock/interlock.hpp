@@ -105,6 +105,10 @@ class Interlock {
     [[nodiscard]] std::array<double, 2> seen_g() const noexcept {
         return {seen_g_[0].load(), seen_g_[1].load()};
     }
+    /// Acquisition thread: platform, table: whatever the newest judgement found wrong of it.
+    [[nodiscard]] std::array<bool, 2> contradicts() const noexcept {
+        return sampled_under_ == Guard::excitation ? verdict_.contradicts : std::array<bool, 2>{};
+    }
     /// The newest second of force and angles.
     [[nodiscard]] MeanMotion second() const noexcept { return second_.read(); }
     /// Control thread, slowly: innovations of the filter (0: none yet), free space.
@@ -198,7 +202,7 @@ class Interlock {
     void follow_ramp(const drivers::Sample& sample) noexcept;
     void check_witnesses(const drivers::Sample& sample) noexcept;
     void check_random(const drivers::Sample& sample) noexcept;
-    [[nodiscard]] bool table_beyond_limit(const drivers::Sample& sample) const noexcept;
+    [[nodiscard]] bool table_beyond_limit(const drivers::Sample& sample) noexcept;
     /// What is commanded is random vibration, and not rest.
     [[nodiscard]] bool at_random() const noexcept {
         return commanded_.random > 0 && std::max(commanded_.start_g, commanded_.target_g) > 0;
@@ -255,7 +259,9 @@ class Interlock {
     Ramp commanded_;
     drivers::Time controller_began_ = 0;
     drivers::Time sample_time_ = 0;  ///< of the newest sample
-    bool motion_stood_ = false;      ///< no motion was to be had of the sample before
+    /// When the table's reading was out of its range last, and when it was so once more; 0: never.
+    drivers::Time out_of_range_at_ = 0, out_of_range_again_ = 0;
+    bool motion_stood_ = false;  ///< no motion was to be had of the sample before
     Guard sampled_under_ = Guard::idle;
     MotionMonitor motion_;
     LossMonitor loss_;

@@ -33,7 +33,9 @@ struct RestWitness {
     double rms_g = 0;        ///< over the window; 0 while unknown
     drivers::Time from = 0;  ///< first and last sample of the window
     drivers::Time to = 0;
-    bool doubted = false;  ///< unknown because it has not been seen to move since it was doubted
+    /// Unknown because it has not been seen to move since it was doubted, or has lost the noise
+    /// that it had at rest.
+    bool doubted = false;
 };
 
 /// What all accelerometers show at one moment.
@@ -96,6 +98,37 @@ class Doubt {
     bool open_ = false;
 };
 
+/// Whether readings still show the noise that they had at rest: what shows its last value for ever
+/// is as still as nothing else is. Of readings whose noise was never clearly beyond two counts that
+/// cannot be told.
+class Liveness {
+  public:
+    Liveness(drivers::Time window, drivers::Time sample_period)
+        : window_(window), silent_for_(window - 2 * sample_period) {}
+    void add(drivers::Time time, std::span<const double> values,
+             std::span<const double> counts_g) noexcept;
+    /// Whether the window up to the newest reading is one of rest, lost or not.
+    void judged(bool still, std::span<const double> counts_g) noexcept;
+    /// One that lived has stayed within two counts for a window.
+    [[nodiscard]] bool lost() const noexcept;
+
+  private:
+    struct Axis {
+        double low = 0, high = 0;  ///< since it went beyond two counts last
+        drivers::Time since = 0;
+        double rest_low = 0, rest_high = 0;  ///< of the window of rest at work
+        double middle = 0;                   ///< of the one before
+        int windows = 0;                     ///< of rest in a row with its noise
+        bool lived = false;
+    };
+    void begin_window() noexcept;
+
+    drivers::Time window_, silent_for_;
+    drivers::Time newest_ = 0, rest_from_ = 0;
+    std::array<double, 3> newest_value_{};
+    std::array<Axis, 3> axes_{};
+};
+
 /// Rest as a measurement: the rms of the norm of the specific force less its mean, and of the table
 /// accelerometer where there is one. The norm, not the axes: a slow tilt is no vibration.
 class RestMonitor {
@@ -119,6 +152,7 @@ class RestMonitor {
     drivers::Time stale_after_;
     RestWindow platform_, table_;
     Doubt platform_doubt_, table_doubt_;
+    Liveness platform_life_, table_life_;
     Snapshot<Rest> view_;
 };
 

@@ -127,19 +127,27 @@ void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     to_.interlock.check(sample, assembler_.platform());
     doubt_witness();
     if (to_.stages != nullptr) to_.stages->take(sample);
-    shown_.rate.add(sample);
+    // Without its count a sample's time is not measured, nor is the rate.
+    if (assembler_.sync_silent(sample.time))
+        shown_.rate = {};
+    else
+        shown_.rate.add(sample);
     batch_[batched_++] = sample;
     if (batched_ == batch_.size()) push_batch();
 }
 
 /// A trip that an accelerometer has shown leaves two to be believed, the table and it: that it is
-/// still afterwards proves nothing.
+/// still afterwards proves nothing. The same holds for each that contradicted the command then.
 void Acquisition::doubt_witness() noexcept {
     const Tripped trip = to_.interlock.latched();
     if (trip == doubted_) return;
     doubted_ = trip;
-    if (to_.rest != nullptr && trip.channel < drivers::kChannels)
+    if (to_.rest == nullptr || !trip) return;
+    const auto [platform, table] = to_.interlock.contradicts();
+    if (trip.channel < drivers::kChannels)
         to_.rest->doubt(static_cast<drivers::Channel>(trip.channel));
+    if (platform) to_.rest->doubt(drivers::Channel::accel_x);
+    if (table) to_.rest->doubt(drivers::Channel::table_accel);
 }
 
 void Acquisition::push_batch() noexcept {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <utility>
-
 #include "daemon/rt/angle_blocks.hpp"
 #include "estimator/identification/identification.hpp"
 

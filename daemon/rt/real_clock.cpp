@@ -1,18 +1,12 @@
 #include "daemon/rt/real_clock.hpp"
 
 #include <atomic>
-#include <ctime>
 
+#include "daemon/interlock/interlock.hpp"
 #include "drivers/base/event_fd.hpp"
 
 namespace vibrig::rt {
 namespace {
-
-drivers::Time monotonic() noexcept {
-    timespec now{};
-    ::clock_gettime(CLOCK_MONOTONIC, &now);
-    return static_cast<drivers::Time>(now.tv_sec) * drivers::kSecond + now.tv_nsec;
-}
 
 class RealWaiter final : public drivers::Waiter {
   public:
@@ -25,7 +19,7 @@ class RealWaiter final : public drivers::Waiter {
             if (pending_.exchange(false)) return true;
             long long left = -1;
             if (deadline != drivers::kNever) {
-                left = deadline - monotonic();
+                left = deadline - steady_now();
                 if (left <= 0) return false;
             }
             if (event_.wait(left)) event_.clear();
@@ -39,7 +33,7 @@ class RealWaiter final : public drivers::Waiter {
 
 }  // namespace
 
-drivers::Time RealClock::now() const noexcept { return monotonic(); }
+drivers::Time RealClock::now() const noexcept { return steady_now(); }
 
 std::unique_ptr<drivers::Waiter> RealClock::make_waiter() { return std::make_unique<RealWaiter>(); }
 

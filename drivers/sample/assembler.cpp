@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -41,6 +42,13 @@ double wrapped_radians(double degrees) noexcept {
     return angle < kTurn ? angle : 0.0;
 }
 
+/// FNV-1a.
+std::uint64_t digest(std::span<const std::uint8_t> bytes) noexcept {
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 1099511628211ULL;
+    return hash;
+}
+
 /// A classic frame is as long as the DBC says; CAN FD has no frames of, say, 61 bytes: the next
 /// longer one carries them.
 bool has_length(const ReceivedFrame& frame, std::uint8_t size) noexcept {
@@ -57,8 +65,9 @@ struct SampleAssembler::Impl {
     struct OpenSample {
         bool shown = false;  ///< a frame of it has come
         std::int64_t count = 0;
-        Time first = 0;          ///< time of the first frame that came
-        std::uint64_t seen = 0;  ///< bits of the messages that came
+        Time first = 0;                           ///< time of the first frame that came
+        std::uint64_t seen = 0;                   ///< bits of the messages that came
+        std::array<std::uint64_t, 64> content{};  ///< of each, by its bit
         std::uint64_t frames = 0;
         std::array<double, kChannels> value{};
         std::array<Time, kChannels> time{};
@@ -95,6 +104,7 @@ struct SampleAssembler::Impl {
     bool join(OpenSample& sample, const MessagePlan& message, const ReceivedFrame& frame,
               std::uint32_t part) noexcept;
     void take_status(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
+    void take_status(const StatusRow& row, double value, Time time) noexcept;
     void suspect_restart(std::uint64_t raw, unsigned bits, const MessagePlan& message,
                          const ReceivedFrame& frame) noexcept;
     void drop_suspect() noexcept;
@@ -104,6 +114,12 @@ struct SampleAssembler::Impl {
     void drain(Time now) noexcept;
     void give_out(OpenSample& sample) noexcept;
     void count_joined(bool joined) noexcept { ++(joined ? counters.used : counters.duplicate); }
+    [[nodiscard]] bool sync_silent(Time now) const noexcept {
+        const bool seldom = sync_period > settings.stale_deadline;
+        const Time deadline = std::max(
+            settings.stale_deadline, seldom ? std::max(kSecond, 3 * sync_period) : 4 * sync_period);
+        return sync_time != 0 && now - sync_time > deadline;
+    }
     [[nodiscard]] Quality judge(const OpenSample& sample, std::size_t channel) const noexcept;
     /// The earliest count not yet given out of which a frame has come.
     [[nodiscard]] OpenSample* first_shown() noexcept;
@@ -133,11 +149,15 @@ struct SampleAssembler::Impl {
     std::array<Time, kChannels> last_good{};
     std::array<bool, kChannels> ever_good{};
     PlatformStatus platform;
+    Time loop_time = 0, fault_time = 0;  ///< of its newest frame
+    Time newest_frame = 0;
+    Time sync_time = 0, sync_period = 0;  ///< of its newest frame; about how often they come
     AssemblerCounters counters;
 };
 
 void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
     ++counters.received;
+    newest_frame = frame.time;
     const canid_t id = frame.frame.can_id;
     const bool extended = (id & CAN_EFF_FLAG) != 0;
     const MessagePlan* message =
@@ -188,6 +208,10 @@ void SampleAssembler::Impl::begin_at(std::int64_t count, Time time) noexcept {
 void SampleAssembler::Impl::take_sync(const MessagePlan& message, const ReceivedFrame& frame,
                                       std::uint64_t raw) noexcept {
     const unsigned bits = message.count->length;
+    if (const Time since = frame.time - sync_time;
+        sync_time != 0 && since >= settings.sample_period / 2)
+        sync_period = sync_period == 0 ? since : std::min(since, 2 * sync_period);
+    sync_time = std::max(sync_time, frame.time);
     if (!begun) begin_at(static_cast<std::int64_t>(raw), frame.time);
     const double elapsed = periods_since_newest(frame.time);
     const std::int64_t expected = newest + static_cast<std::int64_t>(elapsed);
@@ -346,6 +370,15 @@ bool SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
     }
     const std::span<const std::uint8_t> payload(frame.frame.data, frame.frame.len);
     const std::uint64_t bits = message.bits(payload);
+    if (message.multiplexor == nullptr) {
+        std::uint64_t& content = sample.content[static_cast<std::size_t>(std::countr_zero(bits))];
+        const std::uint64_t now = digest(payload);
+        if ((bits & sample.seen) != 0 && content != now && part + 1 == parts) {
+            ++counters.contradicting;
+            counters.contradicting_id = frame.frame.can_id & CAN_EFF_MASK;
+        }
+        if ((bits & sample.seen) == 0) content = now;
+    }
     if ((bits & ~sample.seen) == 0) return false;
     ++sample.frames;
     sample.seen |= bits;
@@ -374,22 +407,40 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
         if (!proto::present(*message.message, *s.signal, payload)) continue;
         const std::optional<double> value = proto::decode(*s.signal, payload);
         if (!value || !std::isfinite(*value) || proto::out_of_range(*s.signal, *value)) continue;
-        const StatusRow& row = *s.row;
-        if (row.sensor) {
-            platform.sensor_c[*row.sensor] = *value;
-            platform.sensor_time[*row.sensor] = frame.time;
-            continue;
-        }
-        (row.of_gimbals ? platform.gimbal_time : platform.time) = frame.time;
-        if (row.flag != nullptr) {
-            platform.*row.flag = *value != 0;
-        } else if (row.of_gimbals) {
-            platform.gimbal_command_echo =
-                static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
-        } else {
-            platform.temperature_c = *value;
-        }
+        take_status(*s.row, *value, frame.time);
     }
+}
+
+void SampleAssembler::Impl::take_status(const StatusRow& row, double value, Time time) noexcept {
+    if (row.sensor) {
+        platform.sensor_c[*row.sensor] = value;
+        platform.sensor_time[*row.sensor] = time;
+        return;
+    }
+    if (row.flag != nullptr) {
+        platform.*row.flag = value != 0;
+    } else if (row.of_gimbals) {
+        platform.gimbal_command_echo = static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
+    } else {
+        platform.temperature_c = value;
+        platform.temperature_time = time;
+    }
+    if (row.of_gimbals) {
+        platform.gimbal_time = time;
+        return;
+    }
+    if (row.flag == &PlatformStatus::loop_closed) loop_time = time;
+    if (row.flag == &PlatformStatus::fault) fault_time = time;
+    // Of two that come one right behind the other the worse one counts.
+    platform.loop_was_open = platform.loop_was_open || (loop_time != 0 && !platform.loop_closed);
+    platform.had_fault = platform.had_fault || platform.fault;
+    // A message that comes does not make those fresh that come in another one.
+    const bool loop_bound = !settings.bindings.loop_closed.empty();
+    const bool fault_bound = !settings.bindings.fault.empty();
+    if (loop_bound && fault_bound)
+        platform.time = std::min(loop_time, fault_time);
+    else
+        platform.time = loop_bound ? loop_time : fault_bound ? fault_time : time;
 }
 
 auto SampleAssembler::Impl::first_shown() noexcept -> OpenSample* {
@@ -448,12 +499,13 @@ void SampleAssembler::Impl::give_out(OpenSample& open_sample) noexcept {
     last_out = sample.time;
     any_out = true;
 
-    bool incomplete = false;
+    bool incomplete = false, invalid = false;
     sample.quality.fill(Quality::unbound);
     for (std::size_t c = 0; c < kChannels; ++c) {
         const Quality quality = judge(open_sample, c);
         sample.quality[c] = quality;
         incomplete = incomplete || quality == Quality::missing || quality == Quality::stale;
+        invalid = invalid || quality == Quality::flagged || quality == Quality::out_of_range;
         if (quality == Quality::good) {
             ever_good[c] = true;
             last_good[c] = std::max(last_good[c], open_sample.time[c]);
@@ -465,8 +517,12 @@ void SampleAssembler::Impl::give_out(OpenSample& open_sample) noexcept {
     }
     sample.table_accel = open_sample.value[6];
     ++counters.samples;
-    if (incomplete) ++counters.incomplete;
+    if (incomplete)
+        ++counters.incomplete;
+    else if (invalid)
+        ++counters.invalid;
     if (on_sample) on_sample(sample);
+    platform.loop_was_open = platform.had_fault = false;  // judged with this sample
 }
 
 SampleAssembler::SampleAssembler(const proto::Dbc& dbc, const AssemblerSettings& settings,
@@ -501,13 +557,17 @@ Time SampleAssembler::next_deadline() const noexcept {
 const PlatformStatus& SampleAssembler::platform() const noexcept { return impl_->platform; }
 
 Time SampleAssembler::last_good(Channel channel) const noexcept {
-    return impl_->last_good[static_cast<std::size_t>(channel)];
+    const Time at = impl_->last_good[static_cast<std::size_t>(channel)];
+    return impl_->sync_silent(impl_->newest_frame) ? std::min(at, impl_->sync_time) : at;
 }
 
 bool SampleAssembler::stale(Channel channel, Time now) const noexcept {
     const auto c = static_cast<std::size_t>(channel);
-    return !impl_->ever_good[c] || now - impl_->last_good[c] > impl_->settings.stale_deadline;
+    return !impl_->ever_good[c] || now - impl_->last_good[c] > impl_->settings.stale_deadline ||
+           impl_->sync_silent(now);
 }
+
+bool SampleAssembler::sync_silent(Time now) const noexcept { return impl_->sync_silent(now); }
 
 const AssemblerCounters& SampleAssembler::counters() const noexcept { return impl_->counters; }
 

@@ -51,8 +51,13 @@ struct AssemblerSettings {
 struct AssemblerCounters {
     std::uint64_t received = 0, used = 0, unknown = 0, duplicate = 0, late = 0, wrong_length = 0;
     std::uint64_t samples = 0, incomplete = 0;  ///< given out; of them with a missing channel
-    std::uint64_t gaps = 0;                     ///< sync counts that never showed
-    std::uint64_t resyncs = 0;                  ///< jumps of the counter (device restart)
+    std::uint64_t invalid = 0;  ///< given out with nothing missing, flagged or out of its range
+    /// Of `duplicate`: with another content than the first, as two nodes of one id send; and the id
+    /// of the newest.
+    std::uint64_t contradicting = 0;
+    std::uint32_t contradicting_id = 0;
+    std::uint64_t gaps = 0;     ///< sync counts that never showed
+    std::uint64_t resyncs = 0;  ///< jumps of the counter (device restart)
 };
 
 /// Joins frames of one sync count into Samples. One thread; no allocation after construction; no
@@ -72,9 +77,15 @@ class SampleAssembler {
     void advance(Time now) noexcept;
     [[nodiscard]] Time next_deadline() const noexcept;
     [[nodiscard]] const PlatformStatus& platform() const noexcept;
-    /// Newest time a good value of the channel came; 0: never.
+    /// Newest time a good value of the channel came; 0: never. While the sync count is silent no
+    /// later than that.
     [[nodiscard]] Time last_good(Channel channel) const noexcept;
     [[nodiscard]] bool stale(Channel channel, Time now) const noexcept;
+    /// The sync count, where there is one, has not come for the deadline of a channel (or four of
+    /// its periods), or for a second (or three of them) where it comes less often than that: counts
+    /// and times go on by themselves, and nobody knows for how long they are right. All channels
+    /// are stale then.
+    [[nodiscard]] bool sync_silent(Time now) const noexcept;
     [[nodiscard]] const AssemblerCounters& counters() const noexcept;
 
   private:

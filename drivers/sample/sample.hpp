@@ -90,13 +90,18 @@ inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x"
 
 /// What the platform reports of itself; slower than samples. Latest value wins.
 struct PlatformStatus {
-    Time time = 0;             ///< of the newest status frame; 0: none yet
+    /// As old as what is older of loop_closed and fault, whatever else comes; 0: not both have come
+    /// yet. Where neither is bound: of the newest of the others.
+    Time time = 0;
     bool ready = false;        ///< the platform's own ready flag
     bool loop_closed = false;  ///< stabilisation loop closed
     bool gyros_at_speed = false;
     double temperature_c = 0;  ///< platform temperature, deg C
     bool fault = false;
-    Time gimbal_time = 0;  ///< of the newest gimbal status frame; 0: none yet
+    /// At any time since the sample before, whatever was said after it.
+    bool loop_was_open = false, had_fault = false;
+    Time temperature_time = 0;  ///< of the newest temperature_c; 0: none yet
+    Time gimbal_time = 0;       ///< of the newest gimbal status frame; 0: none yet
     bool in_position = false;
     bool slewing = false;
     std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted

@@ -4,11 +4,11 @@
 #include <array>
 #include <cctype>
 #include <cstddef>
-#include <numeric>
 #include <utility>
 #include <vector>
 
 #include "drivers/sample/assembler.hpp"
+#include "proto/edits.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::drivers {
@@ -16,13 +16,18 @@ namespace {
 
 constexpr std::size_t kOffers = 4;
 
-char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
+std::string lower(std::string_view text) {
+    std::string out(text);
+    std::ranges::transform(out, out.begin(), [](unsigned char c) { return std::tolower(c); });
+    return out;
+}
 
-/// The names nearest to `wanted`, nearest first.
+/// The names nearest to `wanted`, upper and lower case alike, nearest first.
 std::string nearest(const std::vector<std::string>& names, std::string_view wanted) {
     std::vector<std::pair<std::size_t, std::string>> ranked;
     ranked.reserve(names.size());
-    for (const std::string& name : names) ranked.emplace_back(edit_distance(name, wanted), name);
+    for (const std::string& name : names)
+        ranked.emplace_back(proto::edits(lower(name), lower(wanted)), name);
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
     std::string list;
@@ -33,20 +38,6 @@ std::string nearest(const std::vector<std::string>& names, std::string_view want
 }
 
 }  // namespace
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t{0});
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        std::size_t diagonal = std::exchange(row[0], i + 1);
-        for (std::size_t j = 0; j < b.size(); ++j) {
-            const std::size_t changed = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
-            diagonal = row[j + 1];
-            row[j + 1] = std::min({changed, diagonal + 1, row[j] + 1});
-        }
-    }
-    return row.back();
-}
 
 BindingError::BindingError(std::string key, std::string value, const std::string& offer)
     : std::runtime_error(key + ": found \"" + value + "\", expected " + offer),
@@ -79,11 +70,8 @@ void expect_unit(const BoundSignal& bound, const std::string& key, const std::st
         "mm/s",   "cm/s",    "km/h",        "kn",     "knots",    "mph",  "ft/s", "rad/s",
         "mrad/s", "deg/s",   "deg/min",     "rad/h",  "arcsec/s", "deg/h"};
     if (!bound || unit.empty()) return;
-    std::string stated(proto::trimmed(bound.signal->unit));
-    std::ranges::transform(stated, stated.begin(), lower);
-    std::string expected(unit);
-    std::ranges::transform(expected, expected.begin(), lower);
-    if (stated == expected || std::ranges::find(kUnits, stated) == kUnits.end()) return;
+    const std::string stated = lower(proto::trimmed(bound.signal->unit));
+    if (stated == lower(unit) || std::ranges::find(kUnits, stated) == kUnits.end()) return;
     throw BindingError(key, name,
                        "a signal in " + std::string(unit) + "; in the DBC it is in " +
                            proto::printable(bound.signal->unit) +

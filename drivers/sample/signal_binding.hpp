@@ -25,7 +25,4 @@ struct BoundSignal {
 void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
                  std::string_view unit);
 
-/// Edit distance (Levenshtein), upper and lower case alike.
-[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
-
 }  // namespace vibrig::drivers

@@ -30,13 +30,11 @@ double limit_of(std::span<const double> residual, std::span<double> scratch) noe
 SyncClock::SyncClock(Time nominal_period) noexcept
     : nominal_(static_cast<double>(nominal_period)) {}
 
-void SyncClock::clear() noexcept {
+void SyncClock::reset() noexcept {
     size_ = next_ = 0;
     offset_ = slope_ = 0;
     has_suspect_ = false;
 }
-
-void SyncClock::reset() noexcept { clear(); }
 
 void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
     const Point point{count, stamp};
@@ -54,7 +52,7 @@ void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
                 return;
             }
             const Point first = suspect_;
-            clear();
+            reset();
             ++steps_;
             insert(first);
         }

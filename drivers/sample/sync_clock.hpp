@@ -19,7 +19,6 @@ class SyncClock {
     void observe(std::int64_t count, Time stamp) noexcept;
     /// Whole microseconds; before the first observation 0.
     [[nodiscard]] Time time_of(std::int64_t count) const noexcept;
-    [[nodiscard]] double period_ns() const noexcept { return nominal_ + slope_; }
     /// Forgets everything but the nominal period: the device has started anew.
     void reset() noexcept;
     /// Times the stamps stepped away for good (two in a row by more than 5 periods) and the fit
@@ -36,7 +35,6 @@ class SyncClock {
 
     void insert(Point point) noexcept;
     void fit() noexcept;
-    void clear() noexcept;
 
     double nominal_;  ///< ns
     std::array<Point, kWindow> points_{};

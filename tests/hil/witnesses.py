@@ -94,6 +94,61 @@ def only_witness(checks, programs):
             rig.stop()
 
 
+def frozen_node(checks, programs):
+    """The node that sends all readings shows its last ones for ever, with counters that run on, and the contactor is welded:
+    neither witness moves, and none is believed."""
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+        try:
+            rig.start_plant("--seed", "5", "--warm-up", "2", "--speed", "20")
+            rig.configure(CAMPAIGN)
+            rig.start_daemon()
+            rig.wait_for(r.measuring, 30)
+            said = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+            status = rig.wait_for_state(("recording", *ENDS), 60)
+            checks.equal(r.state_of(status), "recording", f"a node that freezes: it shakes before {[c.stderr for c in said]}")
+            rig.order("fault stuck-contactor")
+            rig.order("fault stuck")
+            status = rig.wait_for(lambda s: s["shaker"].get("rest") == "stop not obeyed", 60)
+            found = f"{status['shaker']}\n{rig.logs()}"
+            checks.check(status["shaker"].get("rest") == "stop not obeyed", "a node that freezes: no stop is confirmed", found)
+            rig.tool("ack", "trip", "--by", "tester")
+            checks.equal(rig.tool("arm", "--by", "tester").returncode, 1, "a node that freezes: and nothing is armed")
+        finally:
+            rig.stop()
+
+
+def died(checks, programs):
+    """Killed while it shakes, by which nothing is known but that: the next life believes no accelerometer that is still."""
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+        try:
+            rig.start_plant("--seed", "5", "--warm-up", "2", "--speed", "20")
+            rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 0]]}, **{"can.signals": {"table_accel": ""}})
+            rig.start_daemon()
+            rig.wait_for(r.measuring, 30)
+            said = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+            status = rig.wait_for_state(("recording", *ENDS), 60)
+            checks.equal(r.state_of(status), "recording", f"killed while it shakes {[c.stderr for c in said]}")
+            rig.order("fault stuck-contactor")
+            rig.daemon.process.kill()
+            rig.daemon.process.wait()
+            rig.order("fault stuck:y")
+            rig.start_daemon()
+            status = rig.wait_for(lambda s: s["shaker"].get("rest") == "stop not obeyed", 60)
+            found = f"{status['shaker']} {status['interlock']}\n{rig.logs()}"
+            checks.check(status["shaker"].get("rest") == "stop not obeyed",
+                         "killed while it shakes: one that is still proves nothing to the next life", found)
+            checks.check("is doubted" in rig.tool("events").stdout, "killed while it shakes: the event says why", found)
+            checks.equal(rig.tool("arm", "--by", "tester").returncode, 1, "killed while it shakes: nothing is armed")
+            rig.order("clear")
+            rig.wait_for(lambda s: rig.tool("ack", "trip", "--by", "tester").returncode == 0, 30)
+            armed = rig.tool("arm", "--by", "tester")
+            checks.equal((armed.returncode, armed.stderr), (0, ""), "killed while it shakes: one that lives again is believed")
+        finally:
+            rig.stop()
+
+
 def wrong_keys(checks, programs):
     for key, value, names in (("encoder_sign", [1, -1, 1], "encoder_sign of the inner"),
                               ("encoder_zero_deg", [0.0, 0.0, 5.0], "encoder_zero_deg of the azimuth")):
@@ -175,6 +230,8 @@ def main():
         lying(checks, programs, f"accelerometer {channel} stuck while it shakes", [], "stuck",
               f"accel_{channel}", during=f"stuck:{channel}")
     only_witness(checks, programs)
+    frozen_node(checks, programs)
+    died(checks, programs)
     wrong_keys(checks, programs)
     wrong_rate(checks, programs)
     silent(checks, programs)

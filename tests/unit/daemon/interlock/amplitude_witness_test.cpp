@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -45,7 +46,9 @@ struct WitnessedRig {
     double armed_g = kArmed_g, at_g = 0, transmission;
     bool transmission_known = true;
     std::optional<std::size_t> stuck{};  ///< accelerometer x, y, z or the table's
-    double largest_off_db = 0;           ///< of what both witnesses show while steady
+    bool frozen = false;                 ///< all of them show their last values for ever
+    std::function<void(drivers::Sample&)> spoil{};
+    double largest_off_db = 0;  ///< of what both witnesses show while steady
 
     explicit WitnessedRig(const plant::Truth& t = quiet_truth(), double configured = 2.0 / 3)
         : truth(t), interlock(shaker, *control, limits(t, configured)), transmission(configured) {
@@ -73,10 +76,11 @@ struct WitnessedRig {
         const auto& readings = rig.readings();
         for (std::size_t i = 0; i < 3; ++i) {
             sample.angle[i] = readings.encoder_deg[i] * std::numbers::pi / 180;
-            if (stuck != i) sample.force[i] = readings.raw_g[i];
+            if (stuck != i && !frozen) sample.force[i] = readings.raw_g[i];
         }
-        if (stuck != 3U) sample.table_accel = readings.table_g;
+        if (stuck != 3U && !frozen) sample.table_accel = readings.table_g;
         sample.time = platform.time = now();
+        if (spoil) spoil(sample);
         interlock.check(sample, platform);
     }
     void wait(double seconds) {
@@ -247,6 +251,102 @@ TEST(AmplitudeWitness, WithoutATableAccelerometerThePlatformStillTells) {
     EXPECT_EQ(rig.trip(), Trip::amplitude_witness);
 }
 
+/// Readings that are good in one of `of`, flagged else.
+std::function<void(drivers::Sample&)> flagged_but_one_in(unsigned of, bool of_table) {
+    return [of, of_table, n = 0U](drivers::Sample& sample) mutable {
+        const auto quality = n++ % of == 0 ? drivers::Quality::good : drivers::Quality::flagged;
+        for (std::size_t c = 3; c < 6; ++c) sample.quality[c] = quality;
+        if (of_table) sample.quality[6] = quality;
+    };
+}
+
+TEST(AmplitudeWitness, OneWhoseReadingsAreInvalidDoesNotKnowAndThatStops) {
+    for (const unsigned of : {3U, 4U, 1000U}) {
+        for (const bool table : {true, false}) {
+            WitnessedRig rig;
+            if (!table) rig.sample.quality[6] = drivers::Quality::unbound;
+            rig.shake(5);
+            rig.wait(3);
+            ASSERT_EQ(rig.trip(), Trip::none) << rig.text();
+            rig.spoil = flagged_but_one_in(of, table);
+            const double taken = rig.until_trip(3);
+            EXPECT_EQ(rig.trip(), Trip::amplitude_witness) << of << " " << rig.text();
+            // half a window until they are too few, and a window and 150 ms of that
+            EXPECT_GT(taken, 0.4);
+            EXPECT_LE(taken, 0.8);
+            EXPECT_NE(rig.text().find("platform does not know the amplitude"), std::string::npos)
+                << rig.text();
+        }
+    }
+}
+
+TEST(AmplitudeWitness, WhatDisagreesWheneverItIsKnownStops) {
+    for (const double scaled : {0.5, 1.9}) {
+        // GIVEN six good readings in half a second: the amplitude is known for 100 ms of it
+        WitnessedRig rig;
+        rig.sample.quality[6] = drivers::Quality::unbound;
+        rig.shake(5);
+        rig.wait(3);
+        rig.spoil = [n = 0U](drivers::Sample& sample) mutable {
+            const bool good = n++ % 20 < 6;
+            for (std::size_t c = 3; c < 6; ++c)
+                sample.quality[c] = good ? drivers::Quality::good : drivers::Quality::flagged;
+        };
+        rig.wait(20);
+        ASSERT_EQ(rig.trip(), Trip::none) << rig.text();
+        rig.rig.shaker().lie({.amplitude_scaled = scaled});
+        const double taken = rig.until_trip(3);
+        EXPECT_GT(taken, 0) << scaled;
+        EXPECT_LE(taken, 1.2) << scaled;
+        EXPECT_EQ(rig.trip(), Trip::amplitude_witness) << scaled;
+    }
+}
+
+/// A share of all frames is lost.
+std::function<void(drivers::Sample&)> lossy(unsigned seed, double share) {
+    return [random = std::mt19937(seed),
+            lost = std::bernoulli_distribution(share)](drivers::Sample& sample) mutable {
+        const auto quality = [&] {
+            return lost(random) ? drivers::Quality::missing : drivers::Quality::good;
+        };
+        sample.quality[3] = sample.quality[4] = quality();
+        sample.quality[5] = quality();
+        sample.quality[6] = quality();
+    };
+}
+
+TEST(AmplitudeWitness, ReadingsThatAreLostNowAndThenAreNoReasonToStop) {
+    // A tenth of all frames: nearly two in ten samples lack one of the platform's.
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+        WitnessedRig rig;
+        rig.spoil = lossy(seed, 0.1);
+        rig.shake(9);
+        rig.wait(1200);
+        EXPECT_EQ(rig.trip(), Trip::none) << "seed " << seed << ": " << rig.text();
+    }
+}
+
+TEST(AmplitudeWitness, EachThatContradictsTheCommandAtTheTripIsNamed) {
+    // GIVEN a node that shows the last values of all accelerometers for ever
+    WitnessedRig rig;
+    rig.shake(5);
+    rig.wait(3);
+    EXPECT_EQ(rig.interlock.contradicts(), (std::array<bool, 2>{false, false}));
+    rig.frozen = true;
+    EXPECT_LE(rig.until_trip(3), 0.6);
+    EXPECT_EQ(rig.trip(), Trip::amplitude_witness) << rig.text();
+    EXPECT_EQ(rig.interlock.contradicts(), (std::array<bool, 2>{true, true}));
+    // one that is stuck alone is named alone
+    WitnessedRig one;
+    one.position({40, 10, 30});
+    one.shake(7);
+    one.wait(3);
+    one.stuck = 3;
+    one.wait(3);
+    EXPECT_EQ(one.trip(), Trip::stuck) << one.text();
+    EXPECT_EQ(one.interlock.contradicts(), (std::array<bool, 2>{false, true}));
+}
+
 class Stuck : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(Stuck, IsSaidOfAnAccelerometerThatCeasesToMoveWithinASecond) {
@@ -320,6 +420,7 @@ void clean_campaign(unsigned seed, int positions) {
     const double measured = truth.transmission * between(0.97, 1.03);
     WitnessedRig rig(truth, measured);
     rig.rig.shaker().lie({.amplitude_scaled = between(0.95, 1.05)});
+    rig.spoil = lossy(seed, between(0, 0.05));
     for (int n = 0; n < positions && rig.trip() == Trip::none; ++n) {
         rig.interlock.guard(Guard::armed);
         rig.position({between(-180, 180), between(-30, 30), between(-180, 180)});

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -86,7 +87,7 @@ struct Rig {
         feed(test::frame_of(test::rig_dbc(), "PlatformStatus", now, {{"LoopClosed", 1}}),
              "PlatformStatus");
         assembler.advance(now);
-        sample.time = platform.time = shaker.now.time = now;
+        sample.time = platform.time = platform.temperature_time = shaker.now.time = now;
         interlock->check(sample, platform);
         interlock->check_ages(assembler, now);
         interlock->check(shaker.now);
@@ -171,6 +172,18 @@ const Case kCases[] = {
          };
      },
      // looked at once a second, over ten: a breach is seen for that long
+     Guard::excitation, Guard::armed, 15},
+    {"frame_loss_of_flagged_readings", Trip::frame_loss, 10,
+     [](Rig& rig, bool beyond) {
+         rig.sent = [&rig, every = beyond ? 8U : 10U](const char* name) {
+             if (std::string_view(name) != "AccelerometersXY" || rig.count % every != 0)
+                 return true;
+             rig.assembler.feed(test::frame_of(test::rig_dbc(), name,
+                                               rig.count * test::kPeriod + kSecond,
+                                               {{"X", 0}, {"SyncLow", rig.count % 256}}));
+             return false;
+         };
+     },
      Guard::excitation, Guard::armed, 15},
     {"gimbal_not_in_position", Trip::gimbal_off, 2,
      [](Rig& rig, bool beyond) { rig.sample.angle[1] = (beyond ? -2.01 : -1.99) * kDegree; }},
@@ -355,6 +368,38 @@ TEST(InterlockTable, GrowthIsAnAlarmUntilTheDwellIsOver) {
         if (rig.interlock->row(i).rule->name != "motion_in_step") continue;
         EXPECT_TRUE(std::isnan(rig.interlock->row(i).present)) << "not looked for";
     }
+}
+
+TEST(InterlockTable, UnderRandomVibrationTooFewReadingsAreAWitnessThatKnowsNothing) {
+    Rig rig(default_interlock());
+    rig.interlock->guard(Guard::excitation);
+    rig.interlock->ramp({.start_g = kCommanded_g,
+                         .target_g = kCommanded_g,
+                         .armed_g = kCommanded_g,
+                         .raw_up = {0, 1, 0},
+                         .random = 1});
+    std::mt19937 random(1);
+    std::normal_distribution<double> level(0, kCommanded_g);
+    const auto shake = [&](double seconds, unsigned good_of) {
+        const std::uint32_t end = rig.count + static_cast<std::uint32_t>(seconds * 40);
+        while (rig.count < end && rig.interlock->tripped() == Trip::none) {
+            const double a = level(random);
+            rig.sample.force = {0, 1 + a, 0};
+            rig.sample.table_accel = std::clamp(a, -12.0, 12.0);
+            rig.sample.quality[4] =
+                rig.count % good_of == 0 ? drivers::Quality::good : drivers::Quality::out_of_range;
+            rig.tick();
+        }
+    };
+    shake(20, 1);
+    ASSERT_EQ(rig.interlock->tripped(), Trip::none)
+        << rig.interlock->text_of(rig.interlock->latched());
+    const std::uint32_t from = rig.count;
+    shake(5, 4);
+    EXPECT_EQ(rig.interlock->tripped(), Trip::amplitude_witness);
+    EXPECT_LE(rig.count - from, 0.8 * 40);
+    EXPECT_NE(rig.interlock->text_of(rig.interlock->latched()).find("platform does not know"),
+              std::string::npos);
 }
 
 TEST(InterlockTable, AllConditionsAreTried) {

@@ -74,6 +74,39 @@ TEST_F(InterlockTest, TakesANanForAnOverAmplitude) {
     EXPECT_EQ(interlock.tripped(), Trip::over_amplitude);
 }
 
+TEST_F(InterlockTest, TakesTwoReadingsOutOfTheirRangeWithinAMomentForAnOverAmplitude) {
+    interlock.guard(Guard::excitation);
+    const auto at = [&](drivers::Time time, drivers::Quality quality) {
+        sample.time = drivers::kSecond + time;
+        sample.quality[static_cast<std::size_t>(drivers::Channel::table_accel)] = quality;
+        interlock.check(sample, platform);
+    };
+    // GIVEN one now and then, which a bit may be that fell over
+    for (drivers::Time time = 0; time < 2 * drivers::kSecond; time += kPeriod)
+        at(time, time % (200 * drivers::kMillisecond) == 0 ? drivers::Quality::out_of_range
+                                                           : drivers::Quality::good);
+    EXPECT_EQ(interlock.tripped(), Trip::none);
+    at(2000 * drivers::kMillisecond, drivers::Quality::out_of_range);
+    EXPECT_EQ(interlock.tripped(), Trip::none);
+    at(2050 * drivers::kMillisecond, drivers::Quality::good);
+    at(2075 * drivers::kMillisecond, drivers::Quality::out_of_range);
+    EXPECT_EQ(interlock.tripped(), Trip::over_amplitude);
+}
+
+TEST_F(InterlockTest, AFaultThatAnotherStatusDeniedBeforeTheSampleStops) {
+    interlock.guard(Guard::excitation);
+    interlock.check(sample, platform);
+    ASSERT_EQ(interlock.tripped(), Trip::none);
+    platform.had_fault = true;
+    interlock.check(sample, platform);
+    EXPECT_EQ(interlock.tripped(), Trip::platform_fault);
+    interlock.acknowledge(interlock.latched());
+    platform.had_fault = false;
+    platform.loop_was_open = true;
+    interlock.check(sample, platform);
+    EXPECT_EQ(interlock.tripped(), Trip::loop_open);
+}
+
 TEST_F(InterlockTest, TripsOnTheEmergencyStopAndOnALostBus) {
     interlock.guard(Guard::excitation);
     drivers::ShakerReading reading;
@@ -157,7 +190,7 @@ TEST(TrippedValue, HasCauseRowAndValueOfOneTripWhoeverReadsWhenever) {
     std::thread acquisition([&] {
         drivers::Sample sample;
         drivers::PlatformStatus platform;
-        platform.time = 1;
+        platform.temperature_time = 1;
         platform.temperature_c = 80;
         while (!over.load()) interlock.check(sample, platform);
     });
@@ -281,6 +314,7 @@ TEST_F(TableTest, ALatchedAlarmStaysUntilItsNameIsAcknowledged) {
     make({{"hot", Trip::temperature, Reaction::alarm, 70, 0.1, true},
           {"warm", Trip::temperature, Reaction::alarm, 60, 0, false}});
     platform.temperature_c = 71;
+    platform.temperature_time = sample.time;
     next();
     EXPECT_FALSE(interlock->row(0).raised) << "its dwell is not over";
     for (int n = 0; n < 5; ++n) next();

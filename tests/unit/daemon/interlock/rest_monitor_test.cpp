@@ -222,6 +222,71 @@ TEST_F(DoubtedWitnessTest, WhereAnotherIsThereThatOneAloneDecides) {
     EXPECT_TRUE(run(1).measured());
 }
 
+struct LivenessTest : RestMonitorTest {
+    /// All of them show their last values for ever.
+    Rest run_frozen(double seconds) {
+        const drivers::Sample last = sample();
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += kPeriod;
+            drivers::Sample frozen = last;
+            frozen.time = now;
+            monitor.add(frozen);
+        }
+        return monitor.rest(now);
+    }
+};
+
+TEST_F(LivenessTest, OneThatShowsItsLastValueForEverHasLostItsNoise) {
+    // GIVEN accelerometers whose noise at rest has been seen for a quarter of a minute
+    run(15);
+    platform_g = table_g = 5;
+    ASSERT_TRUE(run(2).moving());
+    // WHEN they cease to say anything new while it shakes THEN that is no rest
+    const Rest rest = run_frozen(20);
+    EXPECT_EQ(rest.platform.verdict, RestVerdict::unknown);
+    EXPECT_EQ(rest.table.verdict, RestVerdict::unknown);
+    EXPECT_TRUE(rest.platform.doubted && rest.table.doubted);
+    EXPECT_FALSE(rest.measured());
+    // and at no moment of it was it one
+    platform_g = table_g = 5;
+    run(2);
+    for (int n = 0; n < 100; ++n) ASSERT_FALSE(run_frozen(0.025).measured()) << n;
+    // WHEN they live again THEN rest is measured
+    platform_g = table_g = 0;
+    EXPECT_TRUE(run(1).measured());
+}
+
+TEST_F(LivenessTest, OfOneWithoutNoiseThatCannotBeTold) {
+    // GIVEN less than half a count of noise, however long that was at rest, and slews between
+    noise_g = 0.3 * kCount_g;
+    tilt_deg_per_s = 10;
+    run(30);
+    tilt_deg_per_s = 0;
+    run(60);
+    platform_g = table_g = 5;
+    run(2);
+    platform_g = table_g = 0;
+    EXPECT_EQ(run(2).platform.verdict, RestVerdict::still);
+    EXPECT_TRUE(run(2).measured());
+    EXPECT_TRUE(run_frozen(2).measured());
+}
+
+TEST_F(LivenessTest, NoiseThatBecomesLessIsForgotten) {
+    // GIVEN a room that is loud by day, and quiet by night
+    noise_g = 20 * kCount_g;
+    run(30);
+    noise_g = kCount_g;
+    run(5);
+    noise_g = 0;
+    EXPECT_TRUE(run(2).measured());
+}
+
+TEST_F(LivenessTest, NoiseOfThreeCountsIsNeverLost) {
+    noise_g = 3 * kCount_g;
+    run(30);
+    for (int n = 0; n < 40'000; ++n) ASSERT_TRUE(run(0.025).measured()) << "seed " << kSeed;
+}
+
 TEST_F(RestMonitorTest, AtAKilohertzMotionIsSeenAsSoon) {
     // GIVEN 1 kHz, where not each sample sums the window up anew
     RestMonitor fast({}, drivers::kMillisecond);

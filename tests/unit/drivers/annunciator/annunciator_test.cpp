@@ -48,7 +48,7 @@ TEST(Annunciator, TheCommandGetsWhatHappenedAsJson) {
     const auto paged = script.text_of("paged");
     EXPECT_NE(paged.find(R"({"source":"vibrigd","kind":"abort","time":"2)"), std::string::npos)
         << paged;
-    EXPECT_NE(paged.find("\"text\":\"a \\\"quoted\\\"\\u000aline\\\\ with \xce\xa9\"}\n"),
+    EXPECT_NE(paged.find("\"text\":\"a \\\"quoted\\\"\\nline\\\\ with \xce\xa9\"}\n"),
               std::string::npos)
         << paged;
 }

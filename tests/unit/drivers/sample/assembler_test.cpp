@@ -218,6 +218,7 @@ TEST_F(Assembler, MarksWhatTheDeviceFlagsAndWhatIsOutOfRange) {
     // THEN a flagged value is no sign of life
     EXPECT_EQ(assembler_->last_good(Channel::inner), 0);
     EXPECT_EQ(assembler_->counters().incomplete, 0u);
+    EXPECT_EQ(assembler_->counters().invalid, 1u);
 }
 
 TEST_F(Assembler, WrapsAnglesIntoOneTurn) {
@@ -329,6 +330,93 @@ TEST_F(Assembler, FollowsThePlatformAndItsGimbals) {
     EXPECT_TRUE(p.in_position && p.slewing);
     EXPECT_EQ(p.gimbal_command_echo, 200);
     EXPECT_EQ(assembler_->counters().used, 2u);
+    expect_closed();
+}
+
+TEST_F(Assembler, TakesThePlatformForAsOldAsTheOlderOfLoopAndFault) {
+    // GIVEN loop, fault and temperature in messages of their own
+    AssemblerSettings settings = rig_settings();
+    settings.bindings.fault = "GimbalStatus.Torquing";
+    settings.bindings.temperature = "PlatformTemperatures.Case";
+    make(settings);
+    const auto say = [this](const char* message, Time time,
+                            const std::vector<std::pair<std::string_view, double>>& values) {
+        assembler_->feed(frame_of(rig_dbc(), message, time, values));
+    };
+    say("PlatformStatus", 5 * kSecond, {{"LoopClosed", 1}, {"Ready", 1}});
+    EXPECT_EQ(assembler_->platform().time, 0) << "of the fault nothing is known";
+    say("GimbalStatus", 6 * kSecond, {{"Torquing", 0}});
+    EXPECT_EQ(assembler_->platform().time, 5 * kSecond);
+    // WHEN the temperature alone comes on THEN it is fresh, and the platform is not
+    say("PlatformTemperatures", 7 * kSecond, {{"Sensor", 0}, {"Case", 30}});
+    say("GimbalStatus", 8 * kSecond, {{"Torquing", 0}});
+    EXPECT_EQ(assembler_->platform().time, 5 * kSecond);
+    EXPECT_EQ(assembler_->platform().temperature_time, 7 * kSecond);
+    say("PlatformStatus", 9 * kSecond, {{"LoopClosed", 1}});
+    EXPECT_EQ(assembler_->platform().time, 8 * kSecond);
+}
+
+TEST_F(Assembler, KeepsAFaultThatIsDeniedRightAfterUntilASampleIsJudged) {
+    PlatformStatus judged;
+    assembler_ = std::make_unique<SampleAssembler>(
+        rig_dbc(), rig_settings(), [&](const Sample&) { judged = assembler_->platform(); });
+    const auto say = [this](bool well) {
+        assembler_->feed(frame_of(rig_dbc(), "PlatformStatus", time_of(2),
+                                  {{"LoopClosed", well ? 1 : 0}, {"Fault", well ? 0 : 1}}));
+    };
+    feed(1);
+    EXPECT_FALSE(judged.loop_was_open || judged.had_fault) << "nothing was said yet";
+    say(false);
+    say(true);
+    feed(2);
+    EXPECT_TRUE(judged.loop_was_open && judged.had_fault);
+    EXPECT_TRUE(judged.loop_closed && !judged.fault);
+    feed(3);
+    EXPECT_FALSE(judged.loop_was_open || judged.had_fault);
+}
+
+TEST_F(Assembler, WithoutItsCountNoChannelIsFresh) {
+    for (std::uint32_t count = 1; count < 40; ++count) feed(count);
+    const auto silent_since = time_of(39);
+    for (std::uint32_t count = 40; count < 80; ++count) {
+        feed(count, {0});
+        const bool silent = time_of(count) - silent_since > rig_settings().stale_deadline;
+        EXPECT_EQ(assembler_->sync_silent(time_of(count)), silent) << count;
+        EXPECT_EQ(assembler_->stale(Channel::outer, time_of(count)), silent) << count;
+        if (silent) {
+            EXPECT_EQ(assembler_->last_good(Channel::outer), silent_since) << count;
+        }
+    }
+    feed(80);
+    EXPECT_FALSE(assembler_->stale(Channel::outer, time_of(80)));
+    EXPECT_EQ(assembler_->last_good(Channel::outer), time_of(80));
+}
+
+TEST_F(Assembler, ACountThatComesSeldomHasASecond) {
+    for (std::uint32_t count = 1; count < 200; ++count) {
+        feed(count, count % 20 == 1 ? std::initializer_list<std::size_t>{}
+                                    : std::initializer_list<std::size_t>{0});
+        if (count > 60) {
+            ASSERT_FALSE(assembler_->sync_silent(time_of(count))) << count;
+        }
+    }
+    EXPECT_TRUE(assembler_->sync_silent(time_of(181) + 2 * kSecond));
+}
+
+TEST_F(Assembler, NamesTheIdOfTwoNodesThatContradictEachOther) {
+    feed(1);
+    std::vector<ReceivedFrame> frames = frames_of_count(2, time_of(2));
+    // The same frame twice says nothing new.
+    for (const std::size_t i : {0U, 1U, 1U}) assembler_->feed(frames[i]);
+    EXPECT_EQ(assembler_->counters().contradicting, 0u);
+    ReceivedFrame other = frames[1];
+    other.frame.data[3] ^= 0x10;
+    assembler_->feed(other);
+    EXPECT_EQ(assembler_->counters().contradicting, 1u);
+    EXPECT_EQ(assembler_->counters().contradicting_id, 257u);
+    EXPECT_EQ(assembler_->counters().duplicate, 2u);
+    for (std::size_t i = 2; i < frames.size(); ++i) assembler_->feed(frames[i]);
+    expect_good(samples_.back(), 2);
     expect_closed();
 }
 

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <optional>
 
+#include "manual_clock.hpp"
 #include "test_bench.hpp"
 
 namespace vibrig::drivers::test {
@@ -161,6 +163,49 @@ TEST(ShakerStop, IsRepeatedWhenTheDeviceRefusesIt) {
     ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
     EXPECT_EQ(refused.load(), 4);
     EXPECT_EQ(server.holding(kRun), 0);
+}
+
+TEST(ShakerStop, IsRepeatedWhateverTheBackoffOfTheLinkIs) {
+    std::atomic<int> refused = 0;
+    TestServer server;
+    ShakerSettings settings = settings_for(server);
+    settings.backoff_min = settings.backoff_max = 60 * kSecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply(kRunning));
+    // GIVEN a controller that is busy, and then one that cuts the line
+    server.script([&](const Request& request) {
+        if (!request.writes(kRun, 0) || ++refused > 4) return Answer{};
+        return refused <= 3 ? Answer{Kind::exception, 6, {}} : Answer{Kind::close, 0, {}};
+    });
+    const auto began = std::chrono::steady_clock::now();
+    bench.shaker->stop_now();
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(5));
+    EXPECT_EQ(server.holding(kRun), 0);
+}
+
+TEST(ShakerStop, IsWrittenAtOnceWhenItIsOrderedAgain) {
+    TestServer server;
+    ManualClock clock;
+    const auto shaker = make_shaker(clock, settings_for(server));
+    shaker->start([] { return true; }, {});
+    static_cast<void>(clock.rest());
+    // GIVEN a stop that was refused, on a clock that stands still
+    server.script([](const Request& request) {
+        return request.writes(kRun, 0) ? Answer{Kind::exception, 6, {}} : Answer{};
+    });
+    shaker->stop_now();
+    static_cast<void>(clock.rest());
+    const auto before = server.writes().size();
+    static_cast<void>(clock.rest());
+    EXPECT_EQ(server.writes().size(), before);
+    // WHEN it is ordered again THEN it does not wait for its turn
+    shaker->stop_now();
+    static_cast<void>(clock.rest());
+    ASSERT_GT(server.writes().size(), before);
+    EXPECT_TRUE(server.writes().back().writes(kRun, 0));
+    EXPECT_TRUE(shaker->stop_pending());
+    shaker->shut_down();
 }
 
 TEST(ShakerStop, MayComeBeforeTheStart) {
