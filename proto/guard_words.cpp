@@ -61,7 +61,7 @@ const char* text_of(GuardCause cause) noexcept {
         "nothing found",
         "vibrigd is silent while the table moves",
         "a stage of vibrigd hangs while the table moves",
-        "the table moves and nobody has armed it",
+        "the table moves and nothing that somebody has armed excites it",
         "the table moves by more than what was armed",
         "a stop was ordered and the table is not at rest: press the emergency stop"};
     return word_of(kWords, cause);

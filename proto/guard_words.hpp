@@ -13,7 +13,7 @@ enum class GuardCause : std::uint8_t {
     none,
     daemon_silent,   ///< no word from the daemon while the table moves or may move
     daemon_hangs,    ///< words come, but one of its stages makes no progress
-    unarmed_motion,  ///< the table moves and nobody has armed it
+    unarmed_motion,  ///< the table moves, and nothing that was armed excites it
     over_level,      ///< more than the armed level
     stop_disobeyed,  ///< a stop was ordered in time and the table is not at rest
 };

@@ -72,7 +72,7 @@ void CampaignDwells::swept(const estimator::spectrum::Sweep& sweep,
     if (!with_.recorder) return;
     record::Swept rows;
     for (const auto& [time_s, hz] : readings)
-        rows.rows.push_back(
+        rows.push_back(
             {ordered_.from + drivers::from_seconds(time_s), sweep.run, sweep.position, hz});
     with_.recorder->swept(std::move(rows));
 }

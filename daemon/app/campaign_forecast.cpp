@@ -1,7 +1,5 @@
 #include "daemon/app/campaign_forecast.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 
 #include "daemon/campaign/campaign.hpp"

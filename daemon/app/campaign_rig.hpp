@@ -41,6 +41,8 @@ class CampaignRig final : public campaign::Rig {
     void transmission(double measured) override { interlock_.transmission(measured); }
     void disobeyed(bool now_so) override;
     void uncommanded() override { interlock_.uncommanded(); }
+    void gimbals_led() override { interlock_.trip(rt::Trip::gimbal_off); }
+    void gimbals_silent() override { interlock_.trip(rt::Trip::stale_platform); }
     void wrong_vibration() override {
         interlock_.wrong_vibration(true);
         interlock_.wrong_vibration(false);  // seen once, before a dwell

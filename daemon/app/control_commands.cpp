@@ -95,7 +95,7 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
         return changed->cause + kJournalToDo;
     if (const auto why = journal_being_verified(); !why.empty()) return why;
     if (arming_) return "another arming is being written to the journal";
-    if (journal_ || rig_clock_) return {};
+    if (journal_ || parts_.rig_clock) return {};
     return "no journal is kept, found campaign.results and journal.file empty: a trip would be "
            "forgotten by a restart";
 }
@@ -198,7 +198,7 @@ void ControlLoop::finish_acknowledging(bool at_once) {
 void ControlLoop::watch_arming() {
     if (armed_by_.empty() || !campaign_.armed_by().empty()) return;
     StatusData status;
-    campaign_.fill(status, clock_.now());
+    campaign_.fill(status, parts_.clock.now());
     end_arming(status.reason.empty() ? name_of(status.state) : status.reason);
 }
 
@@ -274,8 +274,8 @@ void ControlLoop::on_trip(const rt::Tripped& tripped, Time now) {
     campaign_.on_trip(text, now);
     events_.announce(drivers::HornPattern::abort, text);
     watch_arming();
-    if (!pre_trip_) return;
-    pre_trip_->tripped(
+    if (!parts_.pre_trip) return;
+    parts_.pre_trip->tripped(
         {rt::condition_of(tripped.cause).name, interlock_.name_of(tripped), text, now, utc_now()});
 }
 

@@ -15,7 +15,7 @@ void ControlLoop::run() {
     Time next = 0;  // of the campaign
     while (!give_up_.load()) {
         const bool stirred = control_waiter_->take();
-        const Time now = clock_.now();
+        const Time now = parts_.clock.now();
         supervisor_.beat(now);
         const auto words = [this](const RtEvent& event) {
             if (event.dropped_before > 0) {
@@ -33,9 +33,10 @@ void ControlLoop::run() {
         if (first_reading_known_.load() && !std::exchange(first_reading_judged_, true))
             judge_first_reading(now);
         watch_emergency_stop(now);
-        supervisor_.look();
+        supervisor_.look(outside_.guard_lacks());
         watch_outside();
-        interlock_.filter(rig_.excitation() ? estimator_stage_.view().estimate.nis_per_dof : 0);
+        interlock_.filter(
+            parts_.rig.excitation() ? parts_.estimator_stage.view().estimate.nis_per_dof : 0);
         watch_device(now);
         take_commands(now);
         watch_attendance(now);
@@ -96,7 +97,7 @@ void ControlLoop::first_reading(const drivers::ShakerReading& reading) {
 }
 
 void ControlLoop::record_begin(const std::string& by, std::size_t dwells_before) {
-    if (recorder_) recorder_->campaign_begun(recording_head(parts_, by, dwells_before));
+    if (parts_.recorder) parts_.recorder->campaign_begun(recording_head(parts_, by, dwells_before));
 }
 
 void ControlLoop::take_over() {
@@ -138,9 +139,11 @@ void ControlLoop::take_over_latches() {
         log(Severity::alarm, "journal",
             fmt::format("not acknowledged: {}: {}{}", latch.name, latch.cause,
                         latch.name == journal::kJournalLatch ? kJournalToDo : ""));
-        // Whose word it was is not kept: each witness has to show anew that it lives.
+        // Whose word it was is not kept: each witness has to show anew that it lives. An arming
+        // without an end may have tripped so, and nobody could write that.
         if (latch.name == rt::condition_of(rt::Trip::stuck).name ||
-            latch.name == rt::condition_of(rt::Trip::amplitude_witness).name) {
+            latch.name == rt::condition_of(rt::Trip::amplitude_witness).name ||
+            latch.name == journal::kDiedArmed) {
             parts_.rest.doubt(drivers::Channel::accel_x);
             parts_.rest.doubt(drivers::Channel::table_accel);
         }

@@ -150,18 +150,10 @@ class ControlLoop {
     const configuration::Loaded& loaded_ = parts_.loaded;
     const configuration::Configuration& configuration_ = parts_.configuration;
     Events& events_ = parts_.events;
-    const drivers::Clock& clock_ = parts_.clock;
-    const std::unique_ptr<rt::RigClock>& rig_clock_ = parts_.rig_clock;
     const std::unique_ptr<drivers::Shaker>& shaker_ = parts_.shaker;
     const std::unique_ptr<rt::StirredWaiter>& control_waiter_ = parts_.control_waiter;
     rt::Interlock& interlock_ = parts_.interlock;
-    const rt::EstimatorStage& estimator_stage_ = parts_.estimator_stage;
-    const rt::Acquisition& acquisition_ = parts_.acquisition;
     const std::unique_ptr<journal::Journal>& journal_ = parts_.journal;
-    const std::unique_ptr<record::Recorder>& recorder_ = parts_.recorder;
-    const std::unique_ptr<record::PreTrip>& pre_trip_ = parts_.pre_trip;
-    drivers::Gimbal& gimbal_ = parts_.gimbal;
-    CampaignRig& rig_ = parts_.rig;
     CampaignDwells& dwells_ = parts_.dwells;
     campaign::Campaign& campaign_ = parts_.campaign;
 

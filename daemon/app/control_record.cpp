@@ -25,6 +25,12 @@ bool at_rest(CampaignState state) {
            state == CampaignState::aborted;
 }
 
+std::string listed(const std::vector<Part>& parts) {
+    std::string names;
+    for (const Part part : parts) names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    return names;
+}
+
 }  // namespace
 
 /// Before a shaker that is not understood yet runs at all; empty: each of its registers was tried.
@@ -209,8 +215,7 @@ CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json&
     } catch (const std::exception& error) {
         return {false, std::string("not signed: ") + error.what()};
     }
-    std::string names;
-    for (const Part part : parts) names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    const std::string names = listed(parts);
     const auto text =
         fmt::format("{} signed with the certificate of {}, record {}", names, by, book_.sha256());
     log(Severity::info, "commissioning", text);
@@ -258,8 +263,7 @@ CommandReply ControlLoop::record_parts(const CommandRequest& request, const std:
     what.by = {request.by, second};
     what.utc_ns = utc_now();
     what.version = kVersion;
-    std::string names;
-    for (const Part part : parts) names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    const std::string names = listed(parts);
     book_.prove(parts, what, as);
     const auto text = fmt::format("{}{} recorded by {} and {}, record {}",
                                   configuration_.simulated() ? "SIMULATED: " : "", names,

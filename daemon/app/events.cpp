@@ -2,18 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <utility>
 
 #include "proto/text.hpp"
 
 namespace vibrig {
-
-std::int64_t utc_now() {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
 
 void Events::log(Severity severity, const std::string& source, const std::string& text) {
     enter(severity, source, text);

@@ -14,8 +14,7 @@
 
 namespace vibrig {
 
-/// UTC, ns.
-[[nodiscard]] std::int64_t utc_now();
+using journal::utc_now;
 
 /// Every event of the daemon comes through here: to the list that people ask for, the journal, the
 /// recording and the log, an alarm to the pager, too. Any thread that may lock.

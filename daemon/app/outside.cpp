@@ -40,15 +40,16 @@ void Outside::fill(StatusData& status) const {
 
 proto::DaemonWord Outside::word() {
     proto::DaemonWord word;
-    const auto ring = estimator_stage_.ring();
+    const auto ring = parts_.estimator_stage.ring();
     // Who has nothing to do goes on as well: an estimator without samples, a link that is sought.
     if (ring.popped == ring.pushed) ++marks_[0];
-    if (shaker_->state() != drivers::LinkState::running) ++marks_[1];
-    word.progress = {static_cast<std::uint64_t>(acquisition_.view().beat), ring.popped + marks_[0],
-                     supervisor_.control_mark(), shaker_->beats() + marks_[1]};
+    if (parts_.shaker->state() != drivers::LinkState::running) ++marks_[1];
+    word.progress = {static_cast<std::uint64_t>(parts_.acquisition.view().beat),
+                     ring.popped + marks_[0], supervisor_.control_mark(),
+                     parts_.shaker->beats() + marks_[1]};
     word.armed = armed_.load();
-    word.excitation = rig_.excitation();
-    word.stop_ordered = campaign_.stopping();
+    word.excitation = parts_.rig.excitation();
+    word.stop_ordered = parts_.campaign.stopping();
     word.level_g = armed_g_.load();
     word.platform_ratio = platform_ratio_.load();
     return word;
@@ -73,11 +74,13 @@ std::string Outside::guard_found() const {
 }
 
 void Outside::watch(bool tripped, bool alarm) {
-    bool lost = false;
     auto cause = proto::GuardCause::none;
     if (guard_link_) {
         const auto guard = guard_link_->status();
-        lost = !guard.heard;
+        const auto lacked = std::exchange(guard_lacks_, guard_eyes_.lacks(guard, rt::steady_now()));
+        if (guard.heard && lacked != guard_lacks_ && (guard_was_heard_ || !guard_lacks_.empty()))
+            events_.log(guard_lacks_.empty() ? Severity::info : Severity::warning, "guard",
+                        guard_lacks_.empty() ? "sees, and reaches the shaker" : guard_lacks_);
         if (std::exchange(guard_was_heard_, guard.heard) != guard.heard)
             events_.log(guard.heard ? Severity::info : Severity::warning, "guard",
                         guard.heard ? "heard" : "not heard: " + guard.note);
@@ -94,16 +97,16 @@ void Outside::watch(bool tripped, bool alarm) {
                                    proto::text_of(proto::GuardCause::stop_disobeyed));
     }
     const auto annunciator = annunciator_->status();
-    interlock_.outside(lost, cause != proto::GuardCause::none,
-                       annunciator.horn && !annunciator.confirms);
+    parts_.interlock.outside(!guard_lacks_.empty(), cause != proto::GuardCause::none,
+                             annunciator.horn && !annunciator.confirms);
     show(tripped, alarm);
 }
 
 void Outside::show(bool tripped, bool alarm) {
     auto pattern = HornPattern::none;
     if (alarm) pattern = HornPattern::alarm;
-    if (interlock_.latched() || tripped) pattern = HornPattern::abort;
-    if (rig_.is_disobeyed()) pattern = HornPattern::disobeyed;
+    if (parts_.interlock.latched() || tripped) pattern = HornPattern::abort;
+    if (parts_.rig.is_disobeyed()) pattern = HornPattern::disobeyed;
     if (guard_link_ && guard_link_->heard()) {
         const auto guard = guard_link_->word();
         if (guard.disobeyed && !guard.rest) pattern = HornPattern::disobeyed;

@@ -36,6 +36,8 @@ class Outside {
     [[nodiscard]] std::string refuses(const CommandRequest& request) const;
     /// What the guard has found and nobody has acknowledged; empty: nothing.
     [[nodiscard]] std::string guard_found() const;
+    /// Why the guard does not watch, as "is not heard"; empty: it does, or there is none.
+    [[nodiscard]] const std::string& guard_lacks() const noexcept { return guard_lacks_; }
     /// What the guard has found was seen by a person.
     void acknowledge();
     /// For the guard: by a named person, up to this level, peak at the table; 0: nothing is.
@@ -51,15 +53,11 @@ class Outside {
     Parts& parts_;
     const Supervisor& supervisor_;
     Events& events_ = parts_.events;
-    const std::unique_ptr<drivers::Shaker>& shaker_ = parts_.shaker;
-    rt::Interlock& interlock_ = parts_.interlock;
-    const rt::EstimatorStage& estimator_stage_ = parts_.estimator_stage;
-    const rt::Acquisition& acquisition_ = parts_.acquisition;
-    const CampaignRig& rig_ = parts_.rig;
-    const campaign::Campaign& campaign_ = parts_.campaign;
 
     std::unique_ptr<watch::GuardLink> guard_link_;  ///< null: there is no guard
     std::unique_ptr<drivers::Annunciator> annunciator_;
+    watch::GuardEyes guard_eyes_;
+    std::string guard_lacks_;
     bool guard_was_heard_ = false, guard_was_disobeyed_ = false;
     std::uint64_t guard_finding_ = 0;  ///< the one that tripped
     std::atomic<bool> armed_{false};

@@ -3,7 +3,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <chrono>
 #include <utility>
 
 namespace vibrig {
@@ -19,8 +18,8 @@ constexpr Time kPatience = 2 * drivers::kSecond;
 constexpr Time kServerPatience = 7 * drivers::kSecond;
 }  // namespace
 
-void Supervisor::look() {
-    tell_alarms();
+void Supervisor::look(const std::string& guard_lacks) {
+    tell_alarms(guard_lacks);
     tell_controller();
     tell_watchdog();
     if (journal_) tell_journal();
@@ -54,10 +53,25 @@ void Supervisor::check_balance(Time now) {
     if (!found.empty() && imbalance_.empty())
         log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
     imbalance_ = found;
+    tell_contradiction(a.assembler, now);
+}
+
+void Supervisor::tell_contradiction(const drivers::AssemblerCounters& counters, Time now) {
+    // Whoever sends another's id does so with every sample: it is said again once a minute.
+    constexpr Time kAgain = 60 * drivers::kSecond;
+    if (counters.contradicting == contradicting_ ||
+        (contradicting_ > 0 && now - contradiction_told_ < kAgain))
+        return;
+    log(Severity::alarm, "can",
+        fmt::format("two nodes send id {0} ({0:#x}): {1} of its frames say otherwise than the one "
+                    "before of the same count, and are left out",
+                    counters.contradicting_id, counters.contradicting - contradicting_));
+    contradicting_ = counters.contradicting;
+    contradiction_told_ = now;
 }
 
 void Supervisor::tell_clock_misfit() {
-    auto found = fitness_.clock_misfit();
+    auto found = parts_.fitness.clock_misfit();
     if (found == misfit_logged_) return;
     log(found.empty() ? Severity::info : Severity::alarm, "clock",
         found.empty() ? "rig and daemon agree on the time" : found);
@@ -68,9 +82,7 @@ std::string Supervisor::stuck_stage() {
     tell_clock_misfit();
     // In wall time. The simulated rig's clock may stand still, and with it all that waits on it.
     if (!parts_.in_real_time()) return {};
-    const auto wall = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                          std::chrono::steady_clock::now().time_since_epoch())
-                          .count();
+    const Time wall = rt::steady_now();
     const auto acquired = acquisition_.view();
     const auto ring = estimator_stage_.ring();
     struct Stage {
@@ -99,7 +111,7 @@ std::string Supervisor::stuck_stage() {
     return stuck;
 }
 
-void Supervisor::tell_alarms() {
+void Supervisor::tell_alarms(const std::string& guard_lacks) {
     for (std::size_t i = 0; i < interlock_.rows(); ++i) {
         const auto row = interlock_.row(i);
         if (row.raised == raised_[i] || row.rule->reaction != rt::Reaction::alarm) continue;
@@ -107,6 +119,8 @@ void Supervisor::tell_alarms() {
         const auto& condition = rt::condition_of(row.rule->condition);
         if (!row.raised) {
             log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
+        } else if (row.rule->condition == rt::Trip::guard_lost && !guard_lacks.empty()) {
+            log(Severity::alarm, "interlock", row.rule->name + ": vibrig-guard " + guard_lacks);
         } else if (condition.has_limit()) {
             log(Severity::alarm, "interlock",
                 fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
@@ -120,7 +134,7 @@ void Supervisor::tell_alarms() {
 
 void Supervisor::tell_controller() {
     using drivers::ControllerState;
-    const auto now = port_->counters().controller;
+    const auto now = parts_.port->counters().controller;
     if (std::exchange(controller_logged_, now) == now) return;
     log(now == ControllerState::active    ? Severity::info
         : now == ControllerState::warning ? Severity::warning
@@ -130,9 +144,10 @@ void Supervisor::tell_controller() {
 
 bool Supervisor::may_feed() const noexcept {
     const auto reading = shaker_->reading();
-    if (rig_.starving() || campaign_.stopping() || (reading.running && !rig_.excitation()))
+    if (parts_.rig.starving() || parts_.campaign.stopping() ||
+        (reading.running && !parts_.rig.excitation()))
         return false;
-    const Time now = clock_.now();
+    const Time now = parts_.clock.now();
     const Time oldest = std::min(
         {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
     return now - oldest <= kProgressDeadline;

@@ -20,8 +20,8 @@ class Supervisor {
 
     /// The control thread is alive.
     void beat(drivers::Time now) noexcept { control_beat_.store(now); }
-    /// Tells what has changed since the last time.
-    void look();
+    /// Tells what has changed since the last time; `guard_lacks`: why vibrig-guard does not watch.
+    void look(const std::string& guard_lacks);
     /// Once a second: received = handled + dropped (by reason) + waiting.
     void check_balance(drivers::Time now);
     /// A row of the table alarms.
@@ -44,7 +44,7 @@ class Supervisor {
     void log(Severity severity, const std::string& source, const std::string& text) {
         parts_.events.log(severity, source, text);
     }
-    void tell_alarms();
+    void tell_alarms(const std::string& guard_lacks);
     void tell_controller();
     void tell_watchdog();
     void tell_journal();
@@ -52,22 +52,18 @@ class Supervisor {
     void tell_log();
     void watch_onlookers();
     void tell_clock_misfit();
+    void tell_contradiction(const drivers::AssemblerCounters& counters, drivers::Time now);
 
     Parts& parts_;
     journal::Latches& latches_;
     const configuration::Configuration& configuration_ = parts_.configuration;
     const log::LogQueue* const log_queue_ = parts_.log_queue;
-    const drivers::Clock& clock_ = parts_.clock;
-    const std::unique_ptr<drivers::CanPort>& port_ = parts_.port;
     const std::unique_ptr<drivers::Shaker>& shaker_ = parts_.shaker;
     rt::Interlock& interlock_ = parts_.interlock;
     const rt::EstimatorStage& estimator_stage_ = parts_.estimator_stage;
     const rt::Acquisition& acquisition_ = parts_.acquisition;
     const std::unique_ptr<journal::Journal>& journal_ = parts_.journal;
     const std::unique_ptr<record::Recorder>& recorder_ = parts_.recorder;
-    const Fitness& fitness_ = parts_.fitness;
-    const CampaignRig& rig_ = parts_.rig;
-    const campaign::Campaign& campaign_ = parts_.campaign;
 
     // As last logged.
     std::array<bool, rt::kMostRules> raised_{};
@@ -75,7 +71,8 @@ class Supervisor {
     bool watchdog_was_changed_ = false, journal_was_running_ = true, recorder_was_stuck_ = false,
          log_was_blocked_ = false;
     std::string imbalance_;
-    drivers::Time balance_checked_ = 0;
+    drivers::Time balance_checked_ = 0, contradiction_told_ = 0;
+    std::uint64_t contradicting_ = 0;
     std::string misfit_logged_;  ///< thread of stuck_stage()
 
     std::atomic<drivers::Time> control_beat_{0};

@@ -210,15 +210,8 @@ std::array<Print, 6> prints() {
               [] { return vibrig::serve::openapi_json() + "\n"; }}}};
 }
 
-/// Exit code of what only prints: nobody may take half of it, or nothing, for all.
-int printed() {
-    if (std::cout.flush()) return 0;
-    std::cerr << "vibrigd: standard output: cannot be written\n";
-    return 2;
-}
-
 /// --check: the effective configuration, and what can be said of its campaign.
-int print_check(const vibrig::configuration::Loaded& loaded) {
+void print_check(const vibrig::configuration::Loaded& loaded) {
     vibrig::check_bindings(loaded);
     vibrig::check_results(loaded);
     std::cout << vibrig::configuration::format_effective(loaded);
@@ -231,7 +224,6 @@ int print_check(const vibrig::configuration::Loaded& loaded) {
     for (const std::string& line : vibrig::check_plan(loaded.configuration))
         std::cerr << "warning: campaign: " << line << '\n';
     insist(forecast);
-    return printed();
 }
 
 constexpr std::initializer_list<vibrig::proto::Exit> kExits{
@@ -262,12 +254,12 @@ int main(int argc, char** argv) {
     vibrig::proto::refuse_empty_values(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(app, kExits);
-        return printed();
+        return vibrig::proto::printed(app);
     }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? printed() : 2;
+        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
     }
 
     // Blocked before any thread starts, so that sigwait in the main thread gets them all.
@@ -284,11 +276,14 @@ int main(int argc, char** argv) {
         for (const Print& print : printable) {
             if (!print.asked) continue;
             std::cout << print.words();
-            return printed();
+            return vibrig::proto::printed(app);
         }
         auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_certificates(loaded);
-        if (check) return print_check(loaded);
+        if (check) {
+            print_check(loaded);
+            return vibrig::proto::printed(app);
+        }
         const auto& file = loaded.configuration.log_file;
         const int descriptor = file.empty() ? STDERR_FILENO : vibrig::log::open_log_file(file);
         vibrig::log::LogQueue log(descriptor);

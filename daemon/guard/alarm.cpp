@@ -35,12 +35,6 @@ constexpr auto kLookAtPager = std::chrono::milliseconds(50);
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::size_t kLongestText = 600;
 
-Time steady_now() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
-
 std::string words_of(int error) { return std::generic_category().message(error); }
 
 std::string message(Tune kind, const std::string& text) {
@@ -68,6 +62,12 @@ int file_with(const std::string& text) noexcept {
 }
 
 }  // namespace
+
+Time steady_now() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
 
 void say(const char* severity, const std::string& text) {
     pollfd out{STDERR_FILENO, POLLOUT, 0};

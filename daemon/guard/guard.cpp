@@ -8,12 +8,6 @@ namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(50);
 
-drivers::Time monotonic() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
-
 /// A number no earlier life has given: the clock's, in ms.
 std::uint64_t first_finding() {
     return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -54,7 +48,7 @@ void Guard::look_later() {
 }
 
 void Guard::look() {
-    const auto now = monotonic();
+    const auto now = steady_now();
     const bool asked = meeting_.attend(now);
     const auto shaker = shaker_.word(now);
     witnesses_.doubt(now, shaker.known ? shaker.measured_g : 0);
@@ -113,6 +107,15 @@ void Guard::tell_links(drivers::Time now) {
     };
     tell_stuck(reported_table_stuck_, sight_.table_stuck, "table");
     tell_stuck(reported_platform_stuck_, sight_.platform_stuck, "platform");
+    const auto tell_frozen = [](bool& reported, bool frozen, const std::string& where) {
+        if (std::exchange(reported, frozen) == frozen) return;
+        say(frozen ? "warning" : "info",
+            "accelerometer of the " + where +
+                (frozen ? " is frozen: its noise is gone, and what it shows is not believed"
+                        : " shows its noise again"));
+    };
+    tell_frozen(reported_table_frozen_, sight_.table_frozen, "table");
+    tell_frozen(reported_platform_frozen_, sight_.platform_frozen, "platform");
     const bool unreached = !shaker_.word(now).known;
     if (std::exchange(reported_shaker_, unreached) != unreached)
         say(unreached ? "warning" : "info",
@@ -134,19 +137,23 @@ proto::GuardWord Guard::word(drivers::Time now) const {
 }
 
 std::string Guard::words() const {
-    const auto now = monotonic();
+    const auto now = steady_now();
     const auto shaker = shaker_.word(now);
-    const auto of = [](bool there, const Motion& motion, bool stuck) {
+    const auto of = [](bool there, const Motion& motion, bool stuck, bool frozen) {
         if (!there) return std::string("none");
         if (stuck) return std::string("stuck");
+        if (frozen) return std::string("frozen");
         return motion.known ? std::to_string(motion.rest_g) + " g rms" : std::string("not seen");
     };
-    return "table accelerometer " + of(sight_.has_table, sight_.table, sight_.table_stuck) +
-           ", platform " + of(sight_.has_platform, sight_.platform, sight_.platform_stuck) +
+    return "table accelerometer " +
+           of(sight_.has_table, sight_.table, sight_.table_stuck, sight_.table_frozen) +
+           ", platform " +
+           of(sight_.has_platform, sight_.platform, sight_.platform_stuck, sight_.platform_frozen) +
            ", shaker " + (shaker.known ? (shaker.runs ? "runs" : "does not run") : "not reached") +
            ", vibrigd " +
-           (!meeting_.word()              ? "never heard"
-            : meeting_.word()->armed      ? "says armed"
+           (!meeting_.word() ? "never heard"
+            : meeting_.word()->armed
+                ? meeting_.word()->excitation ? "says armed" : "says armed, no excitation"
             : meeting_.word()->excitation ? "says excitation"
                                           : "says disarmed");
 }

@@ -49,6 +49,7 @@ class Guard {
     std::uint64_t reported_finding_ = 0;
     bool reported_disobeyed_ = false, reported_over_ = true;
     bool reported_table_stuck_ = false, reported_platform_stuck_ = false;
+    bool reported_table_frozen_ = false, reported_platform_frozen_ = false;
     bool reported_silent_ = true, reported_blind_ = true, reported_shaker_ = true;
 };
 

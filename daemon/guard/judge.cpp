@@ -14,6 +14,15 @@ constexpr double kFirstWord_s = 3;
 constexpr double kForget_s = 5;
 // Below this peak nothing is more than what was armed: noise, and hands.
 constexpr double kLeastLevel_g = 0.15;
+// Hands, slews and torquers move a platform, too: by more than this rms for so long none of them.
+// The norm of the specific force hardly shows a slew: half a second at 30 deg/s is 0.08 g rms where
+// an axis counts double.
+constexpr double kShaken_g = 0.2;
+constexpr double kShaken_s = 2;
+
+bool moves_table(const ShakerWord& shaker) {
+    return shaker.known && (shaker.runs || shaker.measured_g >= safety::kMoving_g);
+}
 
 }  // namespace
 
@@ -40,6 +49,22 @@ bool Judge::hangs(const Moment& now, const proto::DaemonWord& word) noexcept {
     return hangs;
 }
 
+/// An arming alone moves nothing: between two excitations gimbals and people move the platform, and
+/// neither of them shakes it. What was excited last has its time to come to rest.
+bool Judge::shakes_unexcited(const Evidence& e, const Moment& now, bool armed) noexcept {
+    if (armed && e.word->excitation) excited_ = now;
+    const double since = seconds_between(excited_.value_or(*started_), now);
+    const bool unexcited = armed && !e.word->excitation && since > settings_.stop_deadline_s;
+    const auto moves = [](const Motion& motion, double g) {
+        return motion.known && motion.rest_g > g;
+    };
+    const bool table = moves_table(e.shaker) || moves(e.sight.table, safety::kMoving_g);
+    const bool platform = since > settings_.stop_deadline_s + safety::kRingDown_s &&
+                          moves(e.sight.platform, kShaken_g);
+    const bool by_table = table_unexcited_.for_s(unexcited && table, now, safety::kUnarmedMotion_s);
+    return platform_unexcited_.for_s(unexcited && platform, now, kShaken_s) || by_table;
+}
+
 GuardCause Judge::find(const Evidence& e, const Moment& now) noexcept {
     const bool silent = e.word ? drivers::to_seconds(e.now - e.heard) > safety::kHeartbeatDeadline_s
                                : drivers::to_seconds(e.now - started_->wall) > kFirstWord_s;
@@ -57,11 +82,12 @@ GuardCause Judge::find(const Evidence& e, const Moment& now) noexcept {
         return silent ? GuardCause::daemon_silent : GuardCause::daemon_hangs;
     const bool in_grace = allowed_ && seconds_between(*allowed_, now) <= settings_.stop_deadline_s;
     if (e.word && !silent && !allowed && moving && !in_grace) return GuardCause::unarmed_motion;
+    if (shakes_unexcited(e, now, allowed && !silent)) return GuardCause::unarmed_motion;
     const double level = e.word ? std::min(e.word->level_g, settings_.limit_g) : 0;
     const double most = std::max(level * std::pow(10.0, safety::kOverArmed_dB / 20), kLeastLevel_g);
     // The table shows what was armed; the platform may show more of a plan's other vibration.
-    const double seen =
-        e.word ? std::max(e.sight.table.peak_g, e.sight.by_platform_g / e.word->platform_ratio) : 0;
+    const double ratio = e.word ? std::min(e.word->platform_ratio, settings_.most_ratio) : 1;
+    const double seen = e.word ? std::max(e.sight.table.peak_g, e.sight.by_platform_g / ratio) : 0;
     if (over_.for_s(allowed && e.sight.known() && seen > most, now, safety::kOverArmed_s))
         return GuardCause::over_level;
     return GuardCause::none;
@@ -80,9 +106,7 @@ void Judge::watch_stop(const Evidence& e, const Moment& now) noexcept {
         stop_matters_ || moves_ || cause_ != GuardCause::none || (e.word && e.word->excitation);
     if (!stop_matters_) return;
     const double since = seconds_between(*ordered_, now);
-    const bool table_rests =
-        e.sight.table_rests(settings_.rest_g) &&
-        !(e.shaker.known && (e.shaker.runs || e.shaker.measured_g >= safety::kMoving_g));
+    const bool table_rests = e.sight.table_rests(settings_.rest_g) && !moves_table(e.shaker);
     const bool late = !table_rests && since > settings_.stop_deadline_s;
     const bool ringing = !rests_ && since > settings_.stop_deadline_s + safety::kRingDown_s;
     obeyed_ = obeyed_ || rests_;
@@ -104,8 +128,7 @@ void Judge::found(GuardCause cause) noexcept {
 void Judge::judge(const Evidence& e) noexcept {
     const Moment now{e.now, e.rig};
     if (!started_) started_ = now;
-    const bool shaker_moves =
-        e.shaker.known && (e.shaker.runs || e.shaker.measured_g >= safety::kMoving_g);
+    const bool shaker_moves = moves_table(e.shaker);
     moves_ = e.sight.moves(safety::kMoving_g) || shaker_moves;
     rests_ = e.sight.rests(settings_.rest_g) && !shaker_moves;
     if (const GuardCause cause = find(e, now); cause != GuardCause::none) found(cause);

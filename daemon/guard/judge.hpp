@@ -29,9 +29,10 @@ struct Evidence {
 };
 
 /// Decides by what is measured; of the daemon's words it believes only that somebody armed, up to
-/// which level, and that a stop was ordered. A duration has to have passed in wall time and, where
-/// the simulated rig owns the time, in the rig's too: a rig that stands still is no danger, and
-/// one at high speed is no faster than the words about it. No input or output, no clock.
+/// which level, that it excites, how much more the platform may show of that (within what the
+/// configuration has), and that a stop was ordered. A duration has to have passed in wall time and,
+/// where the simulated rig owns the time, in the rig's too: a rig that stands still is no danger,
+/// and one at high speed is no faster than the words about it. No input or output, no clock.
 class Judge {
   public:
     /// Findings are numbered from `first`, which no earlier life of the guard has used.
@@ -64,6 +65,7 @@ class Judge {
     };
     [[nodiscard]] bool hangs(const Moment& now, const proto::DaemonWord& word) noexcept;
     [[nodiscard]] proto::GuardCause find(const Evidence& e, const Moment& now) noexcept;
+    [[nodiscard]] bool shakes_unexcited(const Evidence& e, const Moment& now, bool armed) noexcept;
     void watch_stop(const Evidence& e, const Moment& now) noexcept;
     void found(proto::GuardCause cause) noexcept;
 
@@ -75,7 +77,8 @@ class Judge {
     std::array<std::uint64_t, 4> progress_{};
     std::array<Moment, 4> progressed_{};
     std::optional<Moment> allowed_;  ///< when it was armed or excited the last time
-    Held moving_, over_, quiet_;
+    std::optional<Moment> excited_;  ///< when it was excited the last time
+    Held moving_, over_, quiet_, table_unexcited_, platform_unexcited_;
     bool forgotten_ = false;  ///< a silent daemon's arming: the table has rested since
 
     std::optional<Moment> ordered_;  ///< since when a stop is ordered and not obeyed

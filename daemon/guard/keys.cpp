@@ -227,10 +227,13 @@ void Keys::numbers(const std::string& key, double* values, std::size_t count) {
     if (key.back() != ']') believe(key, "[" + list + "]");
 }
 
-std::vector<std::array<double, 2>> Keys::pairs(const std::string& key) {
+std::vector<std::array<double, 2>> Keys::pairs(const std::string& key, const std::string& word) {
     std::vector<std::array<double, 2>> out;
     const auto* node = at(key).node();
-    if (node == nullptr) return out;
+    if (node == nullptr || (!word.empty() && node->is_string() && *node->as_string() == word)) {
+        if (!word.empty()) believe(key, in_quotes(word));
+        return out;
+    }
     const auto* rows = node->as_array();
     bool good = rows != nullptr;
     for (std::size_t i = 0; good && i < rows->size(); ++i) {
@@ -246,7 +249,9 @@ std::vector<std::array<double, 2>> Keys::pairs(const std::string& key) {
         if (good) out.push_back(pair);
     }
     if (!good) {
-        wrong(key, node, described(*node), "pairs [[hz, ratio], ..], growing frequencies");
+        wrong(key, node, described(*node),
+              (word.empty() ? "" : in_quotes(word) + " or ") +
+                  "pairs [[hz, ratio], ..], growing frequencies");
         return {};
     }
     std::string list;

@@ -25,8 +25,10 @@ class Keys {
                                      const std::vector<std::string>& words);
     /// An array of exactly so many numbers; an array of such arrays is read row by row, "key[0]".
     void numbers(const std::string& key, double* values, std::size_t count);
-    /// An array of pairs of numbers above 0, the first growing; none: empty.
-    [[nodiscard]] std::vector<std::array<double, 2>> pairs(const std::string& key);
+    /// An array of pairs of numbers above 0, the first growing; none, or this word in its place
+    /// (empty: no word may be): empty.
+    [[nodiscard]] std::vector<std::array<double, 2>> pairs(const std::string& key,
+                                                           const std::string& word = {});
     /// "file:line:column: key: found X, expected Y" for a key that is well written and cannot be.
     void refuse(const std::string& key, const std::string& found, const std::string& expected);
     /// When all is read: what is in the tables that were read in, and is neither what was asked for

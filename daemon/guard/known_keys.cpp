@@ -10,7 +10,7 @@ namespace {
 /// Table, and the names in it.
 constexpr std::pair<const char*, const char*> kByTable[] = {
     {"accelerometer", "bandwidth_hz order range_g response skew_ms"},
-    {"can", "join_deadline_ms samples_per_frame stale_deadline_ms"},
+    {"can", "join_deadline_ms stale_deadline_ms"},
     {"can.signals",
      "azimuth azimuth_valid command_echo fault gyros_at_speed "
      "in_position inner inner_valid loop_closed message_sync_signal "
@@ -27,8 +27,7 @@ constexpr std::pair<const char*, const char*> kByTable[] = {
     {"site", "azimuth_deg elevation_deg latitude_deg"},
     {"spectrum",
      "controller_gain controller_psd elastic_beyond highest_hz mode "
-     "pads_damping sweep_begins_s sweep_rate_tolerance tolerance_deg_h "
-     "transmission"},
+     "sweep_begins_s sweep_rate_tolerance tolerance_deg_h"},
     {"vibration", "frequency_hz level_window_s"},
 };
 

@@ -1,5 +1,6 @@
 #include "daemon/guard/settings.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -86,11 +87,11 @@ void read_shaker(Keys& keys, Settings& s) {
 
 /// |A| at the reference frequency. Of a plan's other frequencies it is at least 0.7 (a plan beyond
 /// that is refused), so that a platform 3 dB louder than it shows is the most that can be.
-double read_seen(Keys& keys) {
+double read_seen(Keys& keys, std::vector<std::array<double, 2>>& table) {
     const double hz = keys.number("vibration.frequency_hz", 15, 0.1, 2000);
     const double bandwidth = keys.number("accelerometer.bandwidth_hz", 0, 0, 100'000);
     const int order = keys.integer("accelerometer.order", 1, 1, 8);
-    const auto table = keys.pairs("accelerometer.response");
+    table = keys.pairs("accelerometer.response");
     if (bandwidth > 0) return 1 / std::sqrt(1 + std::pow(hz / bandwidth, 2 * order));
     if (table.empty()) return 1;
     // Straight on logarithmic scales; beyond the last the daemon refuses.
@@ -104,13 +105,35 @@ double read_seen(Keys& keys) {
     return table.back()[1];
 }
 
-void read_witness(Keys& keys, WitnessSettings& w) {
+/// The most that the platform can show of the armed level, over what it shows of it at the
+/// reference frequency: where the mount, as the file states it, lets the most through.
+double read_most_ratio(Keys& keys, const WitnessSettings& w, bool hard,
+                       const std::vector<std::array<double, 2>>& response) {
+    constexpr double kRounding = 1.001;
+    const double damping = keys.number("spectrum.pads_damping", 0.2, 0.001, 1);
+    const auto measured = keys.pairs("spectrum.transmission", "pads");
+    double most = std::max(w.transmission, 1.0);
+    if (!hard && measured.empty()) {
+        // Of a spring with a dashpot beside it, at its peak.
+        const double z = 4 * damping * damping;
+        const double r2 = (std::sqrt(1 + 2 * z) - 1) / z;
+        most = std::max(most, std::sqrt((1 + z * r2) / ((1 - r2) * (1 - r2) + z * r2)));
+    }
+    if (!hard)
+        for (const auto& [hz, ratio] : measured) most = std::max(most, ratio);
+    double loudest = 1;
+    for (const auto& [hz, ratio] : response) loudest = std::max(loudest, ratio);
+    return kRounding * most * loudest / (w.transmission * w.seen);
+}
+
+void read_witness(Keys& keys, WitnessSettings& w, double& most_ratio) {
     const auto keep_place = [&keys, &w](const std::string& key) {
         if (keys.stated(key)) w.places[key] = keys.place(key);
     };
     w.dbc = keys.text("can.dbc", w.dbc);
     keep_place("can.dbc");
     w.sample_rate_hz = keys.number("can.sample_rate_hz", kUnstatedSampleRate_hz, 1, 10'000);
+    w.samples_per_frame = keys.integer("can.samples_per_frame", w.samples_per_frame, 1, 16);
     constexpr std::array<const char*, 3> kAxes{"accel_x", "accel_y", "accel_z"};
     for (std::size_t i = 0; i < 3; ++i) {
         const std::string key = std::string("can.signals.") + kAxes[i];
@@ -124,7 +147,9 @@ void read_witness(Keys& keys, WitnessSettings& w) {
     // With nothing between them it is 1, stated or not.
     const bool hard = keys.choice("spectrum.mount", 0, {"isolated", "hard"}) == 1;
     w.transmission = keys.number("vibration.transmission", hard ? 1 : w.transmission, 0.001, 10);
-    w.seen = read_seen(keys);
+    std::vector<std::array<double, 2>> response;
+    w.seen = read_seen(keys, response);
+    most_ratio = read_most_ratio(keys, w, hard, response);
     keys.numbers("accelerometer.zero_g", w.zero_g.data(), 3);
     for (std::size_t i = 0; i < 3; ++i)
         keys.numbers("accelerometer.matrix[" + std::to_string(i) + "]", w.matrix[i].data(), 3);
@@ -179,7 +204,7 @@ Settings parse_settings(const std::string& text, const std::string& file) {
         keys.refuse("guard.socket", '"' + s.socket + '"',
                     "an absolute path or \"@name\": vibrigd and the guard meet there");
     read_bus(keys, s.can);
-    read_witness(keys, s.witness);
+    read_witness(keys, s.witness, s.judge.most_ratio);
     read_shaker(keys, s);
     insist_on_registers(keys, s.witness.rig_time);
     read_alarm(keys, s.alarm);

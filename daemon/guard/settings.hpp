@@ -33,6 +33,7 @@ struct WitnessSettings {
     std::array<double, 3> zero_g{};  ///< subtracted, then the matrix: raw to platform axes
     std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     double sample_rate_hz = 0;     ///< to be stated
+    int samples_per_frame = 1;     ///< signal S has the first one's value, S_1, S_2, .. the others'
     double transmission = 0.6667;  ///< platform over table
     double seen = 1;               ///< by the platform's accelerometers, of a vibration's amplitude
     double window_s = safety::kRestWindow_s;
@@ -55,6 +56,8 @@ struct JudgeSettings {
     double rest_g = safety::kRest_g;
     double stop_deadline_s = safety::kStopDeadline_s;
     double limit_g = 12;  ///< of the shaker: an arming above it is not believed
+    /// Of the level the platform may show so many times what it shows at the reference frequency.
+    double most_ratio = 1;
 };
 
 /// What the guard takes from the daemon's configuration file.

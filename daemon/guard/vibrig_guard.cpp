@@ -67,10 +67,10 @@ void run(const vibrig::guard::Settings& settings) {
 int main(int argc, char** argv) {
     CLI::App app{
         "Watches vibrigd and the table from outside: stops the shaker and sounds the horn when "
-        "they "
-        "do not agree",
+        "they do not agree",
         "vibrig-guard"};
     app.footer("Example: vibrig-guard --config /etc/vibrig/vibrigd.toml --check");
+    app.set_version_flag("--version", "vibrig-guard " VIBRIG_VERSION);
     std::string path;
     bool check = false;
     app.add_option("--config", path, "vibrigd's configuration file (TOML)")->required();
@@ -83,12 +83,12 @@ int main(int argc, char** argv) {
                    "what may be over with a later start: a name that is not resolved yet, a "
                    "place that another guard still has"},
                   {2, "bad usage or configuration"}});
-        return 0;
+        return vibrig::proto::printed(app);
     }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
     }
     std::signal(SIGPIPE, SIG_IGN);
     try {
@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
         if (check) {
             const vibrig::guard::Witnesses witnesses(settings.witness);
             std::cout << settings.believed;
-            return 0;
+            return vibrig::proto::printed(app);
         }
         run(settings);
         return 0;

@@ -7,6 +7,9 @@ namespace vibrig::guard {
 
 namespace {
 
+// A simulated rig that says nothing for so long stands still, or is not heard.
+constexpr double kSilentOnTheWall_s = 1;
+
 /// At a low sample rate the window has to be longer to hold enough.
 double window_of(const WitnessSettings& settings) {
     constexpr double kSamples = 16;
@@ -48,22 +51,14 @@ Witnesses::Witnesses(const WitnessSettings& settings)
       dbc_(dbc_of(settings)),
       platform_motion_(window_of(settings), 3),
       table_motion_(window_of(settings), 1),
-      platform_watch_(3, {}),
-      table_watch_(1, {}) {
-    constexpr std::array<const char*, 3> kKeys{"can.signals.accel_x", "can.signals.accel_y",
-                                               "can.signals.accel_z"};
+      platform_watch_(3, {}, window_of(settings)),
+      table_watch_(1, {}, window_of(settings)) {
     std::string problems;
-    for (std::size_t i = 0; i < 3; ++i) {
-        platform_[i] = find(kKeys[i], settings.platform[i], problems);
-        if (platform_[i] && !settings.platform_valid[i].empty()) {
-            const Place valid =
-                find(std::string(kKeys[i]) + "_valid", settings.platform_valid[i], problems);
-            // One that comes in another message would have to be joined; it is left out.
-            if (valid.message == platform_[i].message) platform_[i].valid = valid.value;
-        }
-    }
-    table_ = find("can.signals.table_accel", settings.table, problems);
-    if (problems.empty() && !table_ && !(platform_[0] && platform_[1] && platform_[2]))
+    parts_.resize(static_cast<std::size_t>(std::max(settings.samples_per_frame, 1)));
+    for (std::size_t part = 0; part < parts_.size(); ++part) find_part(part, problems);
+    const auto& platform = parts_.front().platform;
+    const auto& table = parts_.front().table;
+    if (problems.empty() && !table && !(platform[0] && platform[1] && platform[2]))
         problems += placed(settings, "can.signals.table_accel",
                            "\"\" and not three accelerometers on the platform",
                            "one of both at least: the guard would see nothing");
@@ -75,9 +70,31 @@ Witnesses::Witnesses(const WitnessSettings& settings)
                                "the simulated rig's message");
     }
     if (!problems.empty()) throw SettingsError(problems);
-    platform_watch_ =
-        StuckWatch(3, {count_of(platform_[0]), count_of(platform_[1]), count_of(platform_[2])});
-    table_watch_ = StuckWatch(1, {count_of(table_), 0, 0});
+    const double window_s = window_of(settings);
+    platform_watch_ = StuckWatch(
+        3, {count_of(platform[0]), count_of(platform[1]), count_of(platform[2])}, window_s);
+    table_watch_ = StuckWatch(1, {count_of(table), 0, 0}, window_s);
+}
+
+/// Of several samples in a frame signal S carries the first one's value, S_1, S_2, ... the others'.
+void Witnesses::find_part(std::size_t number, std::string& problems) {
+    constexpr std::array<const char*, 3> kKeys{"can.signals.accel_x", "can.signals.accel_y",
+                                               "can.signals.accel_z"};
+    const auto place_of = [this, number, &problems](const std::string& key,
+                                                    const std::string& name) {
+        return find(key, name.empty() || number == 0 ? name : name + '_' + std::to_string(number),
+                    problems);
+    };
+    Part& part = parts_[number];
+    for (std::size_t i = 0; i < 3; ++i) {
+        Place& axis = part.platform[i];
+        axis = place_of(kKeys[i], settings_.platform[i]);
+        if (!axis || settings_.platform_valid[i].empty()) continue;
+        const Place valid = place_of(std::string(kKeys[i]) + "_valid", settings_.platform_valid[i]);
+        // One that comes in another message would have to be joined; it is left out.
+        if (valid.message == axis.message) axis.valid = valid.value;
+    }
+    part.table = place_of("can.signals.table_accel", settings_.table);
 }
 
 Witnesses::Place Witnesses::find(const std::string& key, const std::string& name,
@@ -124,39 +141,64 @@ void Witnesses::take(const drivers::ReceivedFrame& received) {
             rig_now_ = *us * drivers::kMicrosecond;
         return;
     }
-    const double time_s = drivers::to_seconds(time(received.time));
-    if (message == table_.message)
-        if (const auto value = value_of(table_, payload)) {
-            table_motion_.add(time_s, {*value, 0, 0});
-            table_watch_.add(time(received.time), {*value, 0, 0});
-        }
-    for (std::size_t i = 0; i < 3; ++i)
-        if (message == platform_[i].message)
-            if (const auto value = value_of(platform_[i], payload))
-                take_platform(i, *value, time(received.time));
+    const auto at = [&](std::size_t part, const Last& last) {
+        return time_of(part, time(received.time), last);
+    };
+    for (std::size_t number = 0; number < parts_.size(); ++number) {
+        Part& part = parts_[number];
+        if (message == part.table.message)
+            if (const auto value = value_of(part.table, payload)) {
+                table_last_ = {at(number, table_last_), received.time};
+                table_motion_.add(drivers::to_seconds(table_last_.at), {*value, 0, 0});
+                table_watch_.add(table_last_.at, {*value, 0, 0});
+            }
+        for (std::size_t i = 0; i < 3; ++i)
+            if (message == part.platform[i].message)
+                if (const auto value = value_of(part.platform[i], payload))
+                    take_platform(part, i, *value, {at(number, platform_last_), received.time});
+    }
 }
 
-void Witnesses::take_platform(std::size_t axis, double value, drivers::Time at) {
+drivers::Time Witnesses::time_of(std::size_t part, drivers::Time frame, const Last& last) const {
+    const auto later = static_cast<double>(parts_.size() - 1 - part);
+    const auto at = frame - drivers::from_seconds(later / settings_.sample_rate_hz);
+    // A clock that was set back begins anew.
+    return last.at <= frame ? std::max(at, last.at) : at;
+}
+
+void Witnesses::take_platform(Part& part, std::size_t axis, double value, const Last& now) {
     // An axis that comes again before the others have: theirs were lost, and this begins anew.
-    if (seen_[axis]) seen_ = {};
-    raw_[axis] = value - settings_.zero_g[axis];
-    seen_[axis] = true;
-    if (!(seen_[0] && seen_[1] && seen_[2])) return;
-    seen_ = {};
+    if (part.seen[axis]) part.seen = {};
+    part.raw[axis] = value - settings_.zero_g[axis];
+    part.seen[axis] = true;
+    if (!(part.seen[0] && part.seen[1] && part.seen[2])) return;
+    part.seen = {};
     std::array<double, 3> force{};
     for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j) force[i] += settings_.matrix[i][j] * raw_[j];
-    platform_motion_.add(drivers::to_seconds(at), force);
-    platform_watch_.add(at, raw_);
+        for (std::size_t j = 0; j < 3; ++j) force[i] += settings_.matrix[i][j] * part.raw[j];
+    platform_last_ = now;
+    platform_motion_.add(drivers::to_seconds(now.at), force);
+    platform_watch_.add(now.at, part.raw);
+}
+
+/// Where the rig owns the time its silence ages by the wall: no time passes there without its word.
+Motion Witnesses::seen_by(const MotionWindow& motion, const Last& last, bool frozen,
+                          drivers::Time now) const {
+    const bool silent =
+        rig_time_ != nullptr && drivers::to_seconds(now - last.wall) > kSilentOnTheWall_s;
+    return silent || frozen ? Motion{} : motion.at(drivers::to_seconds(time(now)));
 }
 
 Sight Witnesses::sight(drivers::Time now) const {
     Sight sight;
-    const double now_s = drivers::to_seconds(time(now));
-    sight.has_table = static_cast<bool>(table_);
-    sight.has_platform = platform_[0] && platform_[1] && platform_[2];
-    if (sight.has_table) sight.table = table_motion_.at(now_s);
-    if (sight.has_platform) sight.platform = platform_motion_.at(now_s);
+    const auto& axes = parts_.front().platform;
+    sight.has_table = static_cast<bool>(parts_.front().table);
+    sight.has_platform = axes[0] && axes[1] && axes[2];
+    sight.table_frozen = sight.has_table && table_watch_.frozen();
+    sight.platform_frozen = sight.has_platform && platform_watch_.frozen();
+    if (sight.has_table) sight.table = seen_by(table_motion_, table_last_, sight.table_frozen, now);
+    if (sight.has_platform)
+        sight.platform = seen_by(platform_motion_, platform_last_, sight.platform_frozen, now);
     sight.table_stuck = sight.has_table && table_watch_.doubted();
     sight.platform_stuck = sight.has_platform && platform_watch_.doubted();
     sight.by_platform_g = sight.platform.peak_g / shown();

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "daemon/guard/motion.hpp"
@@ -19,7 +18,8 @@ namespace vibrig::guard {
 struct Sight {
     bool has_table = false, has_platform = false;
     Motion table, platform;
-    bool table_stuck = false, platform_stuck = false;  ///< stillness of it is no rest
+    bool table_stuck = false, platform_stuck = false;    ///< stillness of it is no rest
+    bool table_frozen = false, platform_frozen = false;  ///< it is not known: it shows the same
     double table_g = 0;        ///< the largest peak at the table that any of them shows
     double by_platform_g = 0;  ///< the same by the platform's alone
 
@@ -65,12 +65,31 @@ class Witnesses {
         const proto::Signal* valid = nullptr;
         explicit operator bool() const noexcept { return value != nullptr; }
     };
+    /// One of the samples that a frame carries.
+    struct Part {
+        std::array<Place, 3> platform;
+        Place table;
+        std::array<double, 3> raw{};  ///< of the platform, until all three are there
+        std::array<bool, 3> seen{};
+    };
+    /// What was taken last of a witness.
+    struct Last {
+        drivers::Time at = 0;    ///< of the sample
+        drivers::Time wall = 0;  ///< CLOCK_MONOTONIC
+    };
     /// What the platform's accelerometers show, over the table.
     [[nodiscard]] double shown() const noexcept { return settings_.transmission * settings_.seen; }
     [[nodiscard]] Place find(const std::string& key, const std::string& name,
                              std::string& problems) const;
     void take(const drivers::ReceivedFrame& frame);
-    void take_platform(std::size_t axis, double value, drivers::Time at);
+    void take_platform(Part& part, std::size_t axis, double value, const Last& now);
+    void find_part(std::size_t number, std::string& problems);
+    /// Of a frame's sample: the frame comes with its last one. Frames that come in a bunch have one
+    /// stamp, and no sample is before the one that was taken last.
+    [[nodiscard]] drivers::Time time_of(std::size_t part, drivers::Time frame,
+                                        const Last& last) const;
+    [[nodiscard]] Motion seen_by(const MotionWindow& motion, const Last& last, bool frozen,
+                                 drivers::Time now) const;
     /// What one count is, g; 0: the bus carries a floating-point number, or nothing.
     [[nodiscard]] static double count_of(const Place& place) noexcept;
     [[nodiscard]] static std::optional<double> value_of(
@@ -78,13 +97,11 @@ class Witnesses {
 
     WitnessSettings settings_;
     proto::Dbc dbc_;
-    std::array<Place, 3> platform_;
-    Place table_;
+    std::vector<Part> parts_;
     const proto::Message* rig_time_ = nullptr;
     const proto::Signal* rig_time_us_ = nullptr;
     drivers::Time rig_now_ = 0;
-    std::array<double, 3> raw_{};
-    std::array<bool, 3> seen_{};
+    Last platform_last_, table_last_;
     MotionWindow platform_motion_, table_motion_;
     StuckWatch platform_watch_, table_watch_;
 };

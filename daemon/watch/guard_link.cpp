@@ -34,6 +34,20 @@ bool fresh(std::int64_t heard_ns) {
 
 }  // namespace
 
+std::string GuardEyes::lacks(const GuardStatus& guard, std::int64_t now_ns) {
+    // How long it was not heard is counted already.
+    if (!guard.heard) return "is not heard: " + guard.note;
+    if (guard.sees && guard.reaches_shaker) {
+        lacking_since_ns_ = -1;
+        return {};
+    }
+    if (lacking_since_ns_ < 0) lacking_since_ns_ = now_ns;
+    if (static_cast<double>(now_ns - lacking_since_ns_) <= kPatience_s * 1e9) return {};
+    const std::string blind = guard.sees ? "" : "sees no accelerometer";
+    const std::string unlinked = guard.reaches_shaker ? "" : "does not reach the shaker";
+    return blind + (blind.empty() || unlinked.empty() ? "" : " and ") + unlinked;
+}
+
 GuardLink::GuardLink(std::string path, AskWord word)
     : path_(std::move(path)), ask_(std::move(word)), wake_(::eventfd(0, EFD_CLOEXEC)) {
     if (wake_ < 0) throw std::system_error(errno, std::generic_category(), "guard.socket");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -53,6 +54,18 @@ class GuardLink {
     std::string note_ = "never heard";
 
     std::thread thread_;
+};
+
+/// Whether the guard watches: it is heard, sees and reaches the shaker. What it lacks for no longer
+/// than one reply that was lost is nothing. One thread.
+class GuardEyes {
+  public:
+    /// Why it does not, as "is not heard"; empty: it does. `now_ns` is the wall's, steady.
+    [[nodiscard]] std::string lacks(const GuardStatus& guard, std::int64_t now_ns);
+    static constexpr double kPatience_s = 2;
+
+  private:
+    std::int64_t lacking_since_ns_ = -1;  ///< -1: it lacks nothing
 };
 
 }  // namespace vibrig::watch

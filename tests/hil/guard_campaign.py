@@ -412,6 +412,75 @@ def stuck_witness(checks, programs, folder):
         rig.stop()
 
 
+def unexcited(checks, programs, folder):
+    """Armed, and nothing excites: the table moves by itself, its controller reads rest, and the platform's accelerometers are the
+    only witness."""
+    what = "it moves by itself while armed"
+    rig = Guarded(programs, folder, *NO_WATCHDOG)
+    liar = None
+    try:
+        rig.arrange(**{"can.signals": {"table_accel": ""}})
+        rig.start_guard()
+        wait_until(lambda: os.path.exists(rig.meeting))
+        liar = Liar(rig)
+        liar.flags, liar.level_g = 1, 5.0
+        checks.check(wait_until(lambda: liar.heard is not None and liar.heard[1] & 0b1110 == 0b1110), f"{what}: the guard watches",
+                     f"{liar.heard}\n{rig.logs()}")
+        time.sleep(8)   # its time to come to rest is over
+        checks.equal(liar.cause(), "none", f"{what}: armed at rest is no finding")
+        rig.order("table 4.9")
+        checks.check(wait_until(lambda: liar.cause() == "unarmed_motion"), f"{what}: the guard finds it", f"{liar.heard}\n{rig.logs()}")
+        checks.check("shaker does not run, vibrigd says armed, no excitation" in rig.guard.text(), f"{what}: and by what", rig.logs())
+    finally:
+        if liar:
+            liar.end()
+        rig.stop()
+
+
+class FalseGuard:
+    """Answers each word of the daemon's with these flags, and has found nothing."""
+
+    def __init__(self, path):
+        self.flags, self.listener = 0b11110, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.listener.bind(path)
+        self.listener.listen(4)
+        threading.Thread(target=self.answer, daemon=True).start()
+
+    def answer(self):
+        with contextlib.suppress(OSError):   # over
+            while True:
+                link = self.listener.accept()[0]
+                while word := link.recv(100):
+                    link.send(struct.pack("<IHH", GUARD_KIND, self.flags, 0) + word[8:16] + struct.pack("<Qd", 0, 0.0))
+
+
+def blind(checks, programs, folder):
+    """A guard that is heard, and has lost its bus or the shaker while armed."""
+    rig = Guarded(programs, folder)
+    guard = FalseGuard(rig.meeting)
+    try:
+        rig.start_daemon()
+        status = rig.wait_for(watching, SOON)
+        checks.check(status is not None and watching(status), "a blind guard: at first it watches", rig.logs())
+        checks.check(wait_until(lambda: rig.tool("arm", "--by", "Ada").returncode == 0), "a blind guard: armed", rig.logs())
+
+        def lost(s):
+            return any(row["name"] == "guard_lost" and row.get("raised") for row in s["interlock"]["rows"])
+        for flags, lacks in ((0b11100, "vibrig-guard sees no accelerometer"), (0b10110, "vibrig-guard does not reach the shaker")):
+            guard.flags = flags
+            status = rig.wait_for(lost, SOON)
+            checks.check(status is not None and lost(status), f"{lacks}: an alarm", rig.logs())
+            checks.check(wait_until(lambda said=lacks: any(said in text for text in rig.paged("alarm", "vibrigd"))),
+                         f"{lacks}: the pager gets that", rig.logs())
+            checks.equal(rig.status()["campaign"]["state"], "armed", f"{lacks}: and no more")
+            guard.flags = 0b11110
+            status = rig.wait_for(lambda s: not lost(s), SOON)
+            checks.check(status is not None and not lost(status), f"{lacks}: over once it is over", rig.logs())
+    finally:
+        guard.listener.close()
+        rig.stop()
+
+
 def fast(checks, programs, folder):
     """The rig owns the time and is as fast as it can be: a whole campaign, and nothing is found."""
     what = "the rig owns the time"
@@ -419,15 +488,31 @@ def fast(checks, programs, folder):
     try:
         rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 5.0], "dwell_s": 60.0},
                       guard={"socket": rig.meeting})
-        rig.start_guard()
-        rig.start_daemon()
-        status = rig.wait_for(watching, SOON)
-        checks.check(status is not None and watching(status), f"{what}: daemon and guard have found each other", rig.logs())
-        arms_and_starts(checks, rig, what)
-        status = rig.wait_for_state(("finished", "aborted", "tripped"), 4 * SOON)
-        checks.check(status is not None and status["campaign"]["state"] == "finished", f"{what}: the campaign finishes",
-                     r.state_of(status) + rig.logs())
-        checks.check("alarm:" not in rig.guard.text(), f"{what}: the guard finds nothing", rig.logs())
+        finishes(checks, rig, what)
+    finally:
+        rig.stop()
+
+
+def finishes(checks, rig, what):
+    rig.start_guard()
+    rig.start_daemon()
+    status = rig.wait_for(watching, SOON)
+    checks.check(status is not None and watching(status), f"{what}: daemon and guard have found each other", rig.logs())
+    arms_and_starts(checks, rig, what)
+    status = rig.wait_for_state(("finished", "aborted", "tripped"), 4 * SOON)
+    checks.check(status is not None and status["campaign"]["state"] == "finished", f"{what}: the campaign finishes",
+                 r.state_of(status) + rig.logs())
+    checks.check("alarm:" not in rig.guard.text() and "frozen" not in rig.guard.text(), f"{what}: the guard finds nothing", rig.logs())
+
+
+def handled(checks, programs, folder):
+    """Slews, levelling and zeroing move the platform between the excitations, and nothing is on the table: no finding."""
+    what = "slewed, levelled, zeroed"
+    rig = Guarded(programs, folder, clock="rig", truth={"platform": {"slew_error_deg": 0.2}})
+    try:
+        rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 0], [45, 0, 90]], "dwell_s": 20.0, "levelling": True, "zeroing": True},
+                      guard={"socket": rig.meeting}, **{"can.signals": {"table_accel": ""}})
+        finishes(checks, rig, what)
     finally:
         rig.stop()
 
@@ -468,7 +553,7 @@ def main():
                  broken("SIGKILL", killed, by_hand, "daemon_silent"),
                  lies("it says idle, all well", 0, 0.0, 5.0, "unarmed_motion"),
                  lies("armed for 2 g, it does 5 g", 3, 2.0, 5.0, "over_level"), disobeyed, stuck_witness,
-             fast, mixed)
+             unexcited, blind, fast, handled, mixed)
     if "--part" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             parts[int(sys.argv[sys.argv.index("--part") + 1])](checks, programs, folder)

@@ -59,7 +59,7 @@ class World {
     }
 
     Evidence e;
-    Judge judge{JudgeSettings{}, kFirst};
+    Judge judge{JudgeSettings{.most_ratio = 4}, kFirst};
     bool talks = true, rig_goes = true;
     std::size_t hangs = 99;
 
@@ -121,6 +121,77 @@ TEST(Judge, ThePlatformMayShowMoreOfAPlansOtherVibrationTheTableMayNot) {
     table.shake(9 * 1.2);
     table.e.sight.by_platform_g = 9;
     EXPECT_GE(table.pass(5), 0) << "by the table itself";
+}
+
+TEST(Judge, ARatioBeyondWhatTheMountLetsThroughIsNotBelieved) {
+    World world;
+    world.arm(3);
+    world.e.word->platform_ratio = 1000;
+    world.shake(3);
+    world.e.sight.by_platform_g = 3 * 4;
+    ASSERT_EQ(world.pass(5), -1);
+    world.e.sight.by_platform_g = 3 * 4 * 1.2;
+    EXPECT_GE(world.pass(5), 0);
+    EXPECT_EQ(world.judge.cause(), GuardCause::over_level);
+}
+
+TEST(Judge, AnArmedTableThatMovesByItselfIsFoundThoughNothingExcitesIt) {
+    for (const bool has_table : {true, false}) {
+        SCOPED_TRACE(has_table);
+        World world;
+        // GIVEN an excitation that has ended, and the campaign waits, armed
+        world.arm(5);
+        world.shake(5);
+        ASSERT_EQ(world.pass(5), -1);
+        world.arm(5, false);
+        world.shake(0);
+        ASSERT_EQ(world.pass(60), -1);
+        // WHEN the table begins to move by itself
+        world.shake(5);
+        if (!has_table) world.e.sight.has_table = world.e.sight.table.known = false;
+        // THEN
+        EXPECT_NEAR(world.pass(5), has_table ? safety::kUnarmedMotion_s : 2, 2 * kLook_s);
+        EXPECT_EQ(world.judge.cause(), GuardCause::unarmed_motion);
+        EXPECT_TRUE(world.judge.stop_wanted());
+    }
+    World world;
+    world.arm(5, false);
+    ASSERT_EQ(world.pass(5), -1);
+    world.e.shaker = {true, true, 0};  // its controller alone says so
+    EXPECT_NEAR(world.pass(5), safety::kUnarmedMotion_s, 2 * kLook_s);
+}
+
+TEST(Judge, WhatWasExcitedLastHasItsTimeToComeToRest) {
+    World world;
+    world.arm(5);
+    world.shake(5);
+    ASSERT_EQ(world.pass(5), -1);
+    world.arm(5, false);
+    EXPECT_EQ(world.pass(safety::kStopDeadline_s), -1);
+    EXPECT_NEAR(world.pass(5), safety::kUnarmedMotion_s, 2 * kLook_s);
+    // and the platform on its pads as much more as it rings
+    World pads;
+    pads.arm(5);
+    pads.shake(5);
+    ASSERT_EQ(pads.pass(5), -1);
+    pads.arm(5, false);
+    pads.e.sight.table = {true, 0.001, 0.001};
+    EXPECT_EQ(pads.pass(safety::kStopDeadline_s + safety::kRingDown_s), -1);
+    EXPECT_GT(pads.pass(5), 0);
+}
+
+TEST(Judge, HandsAndSlewsOnAnArmedPlatformAreNoExcitation) {
+    World world;
+    world.arm(5, false);
+    ASSERT_EQ(world.pass(20), -1);
+    world.e.sight.platform = {true, 0.19, 0.5};  // for as long as they like
+    EXPECT_EQ(world.pass(600), -1);
+    for (int knock = 0; knock < 10; ++knock) {
+        world.e.sight.platform = {true, 0.5, 1};
+        EXPECT_EQ(world.pass(1.8), -1);
+        world.e.sight.platform = {true, 0.01, 0.1};
+        EXPECT_EQ(world.pass(0.2), -1);
+    }
 }
 
 TEST(Judge, RestOfBeforeDoesNotForgetAnArming) {

@@ -85,6 +85,7 @@ path = "@bus"
 fd = false
 receive_buffer = 8192
 sample_rate_hz = 100
+samples_per_frame = 4
 [can.signals]
 accel_x = "AccelerometersXY.Y"
 accel_x_valid = ""
@@ -128,6 +129,23 @@ TEST(GuardSettings, KnowWhatTheAccelerometersSee) {
     EXPECT_NEAR(seen(table + "[vibration]\nfrequency_hz = 40\n"), 0.8, 1e-12);
     EXPECT_NE(refusal(std::string(kGuard) + "[accelerometer]\nresponse = [[80, 1], [20, 1]]\n")
                   .find("accelerometer.response: found"),
+              std::string::npos);
+}
+
+TEST(GuardSettings, KnowHowMuchMoreThePlatformCanShow) {
+    const auto most = [](const std::string& text) {
+        return parse_settings(std::string(kGuard) + text, "rig.toml").judge.most_ratio;
+    };
+    // Pads with a damping of 0.2 let 2.733 through at their peak, 0.6667 at the reference.
+    EXPECT_NEAR(most(""), 2.733 / 0.6667, 0.01);
+    EXPECT_NEAR(most("[spectrum]\npads_damping = 0.05\n"), 10.06 / 0.6667, 0.05);
+    EXPECT_NEAR(most("[spectrum]\ntransmission = [[10, 1.4], [60, 0.05]]\n"), 1.4 / 0.6667, 0.01);
+    EXPECT_NEAR(most("[spectrum]\nmount = \"hard\"\n"), 1, 0.01);
+    EXPECT_NEAR(most("[spectrum]\nmount = \"hard\"\n[accelerometer]\nbandwidth_hz = 15\n"),
+                std::sqrt(2), 0.01);
+    EXPECT_NE(refusal(kGuard + "[spectrum]\ntransmission = \"pad\"\n")
+                  .find("spectrum.transmission: found \"pad\" (a string), expected \"pads\" or "
+                        "pairs"),
               std::string::npos);
 }
 

@@ -166,6 +166,47 @@ TEST(Witnesses, WhatIsStillBecauseNothingShakesIsNotStuck) {
     }
 }
 
+TEST(Witnesses, OneWhoseNoiseIsGoneIsNotKnownAndNeverAtRest) {
+    for (const bool both : {true, false}) {
+        SCOPED_TRACE(both);
+        Witnesses witnesses{stated()};
+        Bus bus(witnesses);
+        // GIVEN both, with their noise at rest, and shaken
+        ASSERT_TRUE(watched(witnesses, bus, 0, 0, 10, {}).rests(safety::kRest_g));
+        ASSERT_TRUE(watched(witnesses, bus, 5, 5, 3, {}).moves(safety::kMoving_g));
+        // WHEN they show the same for ever, the controller at rest by its word
+        for (int look = 0; look < 40; ++look) {
+            const auto sight =
+                watched(witnesses, bus, 5, 0, 0.05, {.table_stuck = both, .platform_stuck = true});
+            EXPECT_FALSE(sight.rests(safety::kRest_g)) << look;
+            EXPECT_EQ(sight.platform_frozen, look > 7) << look;
+        }
+        const auto sight = witnesses.sight(bus.now);
+        EXPECT_EQ(sight.known(), !both);
+        EXPECT_EQ(sight.table_frozen, both);
+        // AND they are believed again with their noise
+        EXPECT_TRUE(watched(witnesses, bus, 0, 0, 1, {}).rests(safety::kRest_g));
+    }
+}
+
+TEST(Witnesses, OneThatNeverHadNoiseCannotBeFrozen) {
+    WitnessSettings settings = stated();
+    settings.table.clear();
+    Witnesses witnesses(settings);
+    Bus bus(witnesses);
+    const Shown silent{.noise_g = 0};
+    // GIVEN one that is shaken, rings down and slews, and in between shows the same
+    for (int round = 0; round < 20; ++round) {
+        watched(witnesses, bus, 3, 3, 2, silent);
+        for (double g = 0.02; g > 1e-5; g *= 0.7) watched(witnesses, bus, g, 0, 0.2, silent);
+        for (int i = 0; i < 200; ++i) bus.sample(0, -1e-3 * i, bus.now += kPeriod);
+        // THEN its stillness is rest, as before
+        const auto sight = watched(witnesses, bus, 0, 0, 5, silent);
+        EXPECT_TRUE(sight.rests(safety::kRest_g)) << round;
+        EXPECT_FALSE(sight.platform_frozen) << round;
+    }
+}
+
 TEST(Witnesses, OneThatIsSilentIsNotCalledStuck) {
     Witnesses witnesses{stated()};
     Bus bus(witnesses);
@@ -174,6 +215,75 @@ TEST(Witnesses, OneThatIsSilentIsNotCalledStuck) {
     const auto sight = witnesses.sight(bus.now);
     EXPECT_FALSE(sight.table_stuck || sight.platform_stuck);
     EXPECT_FALSE(sight.rests(safety::kRest_g)) << "what is not seen is not at rest";
+}
+
+/// A frame of so many samples, and its DBC.
+class Frames {
+  public:
+    explicit Frames(int parts) {
+        std::string axes;
+        int bit = 0;
+        for (const char* axis : {"X", "Y", "Z", "Axial"})
+            for (int part = 0; part < parts; ++part, bit += 16)
+                axes += std::string(" SG_ ") + axis +
+                        (part == 0 ? "" : "_" + std::to_string(part)) + " : " +
+                        std::to_string(bit) + "|16@1- (0.001,0) [-31|31] \"g\" A\n";
+        path = testing::TempDir() + "several_samples.dbc";
+        std::ofstream(path) << "VERSION \"\"\nBU_: A\nBO_ 273 Acc: 64 A\n" << axes;
+        settings.dbc = path;
+        settings.sample_rate_hz = 1000;
+        settings.samples_per_frame = parts;
+        settings.platform = {"Acc.X", "Acc.Y", "Acc.Z"};
+        settings.platform_valid = {};
+        settings.table = "Acc.Axial";
+    }
+    std::string path;
+    WitnessSettings settings;
+};
+
+TEST(Witnesses, SeeAllSamplesThatAFrameCarries) {
+    constexpr int kParts = 8;
+    Frames frames(kParts);
+    Witnesses witnesses(frames.settings);
+    // GIVEN 5 g at 125 Hz: the first samples of all frames are the same
+    for (int frame = 0; frame < 200; ++frame) {
+        drivers::ReceivedFrame received;
+        received.frame.can_id = 273;
+        received.frame.len = 64;
+        const int last = frame * kParts + kParts - 1;
+        // Frames come in bunches of four on a busy machine.
+        received.time = (last / (4 * kParts) + 1) * 4 * kParts * drivers::kMillisecond;
+        for (int part = 0; part < kParts; ++part) {
+            const double wave =
+                std::sin(2 * std::numbers::pi * 0.125 * (frame * kParts + part) + 0.4);
+            const std::array<double, 4> values{0, 1 + 3 * wave, 0, 5 * wave};
+            for (int axis = 0; axis < 4; ++axis) {
+                const auto raw = static_cast<std::int16_t>(
+                    std::lround(values[static_cast<std::size_t>(axis)] / 0.001));
+                std::memcpy(received.frame.data + 2 * (axis * kParts + part), &raw, 2);
+            }
+        }
+        witnesses.take(std::span(&received, 1));
+    }
+    const auto sight = witnesses.sight(1600 * drivers::kMillisecond);
+    ASSERT_TRUE(sight.table.known && sight.platform.known);
+    EXPECT_NEAR(sight.table.peak_g, 5, 0.05);
+    EXPECT_NEAR(sight.platform.peak_g, 3, 0.05);
+    EXPECT_FALSE(sight.rests(safety::kRest_g));
+    EXPECT_TRUE(sight.moves(safety::kMoving_g));
+}
+
+TEST(Witnesses, OfAFrameThatCarriesFewerSamplesEachIsNamed) {
+    Frames frames(2);
+    frames.settings.samples_per_frame = 3;
+    try {
+        const Witnesses witnesses(frames.settings);
+        ADD_FAILURE() << "a sample that is not there is taken";
+    } catch (const SettingsError& error) {
+        EXPECT_NE(std::string(error.what()).find("can.signals.table_accel: found \"Acc.Axial_2\""),
+                  std::string::npos)
+            << error.what();
+    }
 }
 
 TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
@@ -286,8 +396,10 @@ TEST(Witnesses, GoByTheRigsTimeWhereItOwnsTheTime) {
     }
     EXPECT_TRUE(witnesses.sight(80'000).rests(safety::kRest_g));
     EXPECT_EQ(witnesses.time(80'000), 79 * kPeriod);
-    // THEN an hour of silence in our time is none there
-    EXPECT_TRUE(witnesses.sight(3600 * drivers::kSecond).rests(safety::kRest_g));
+    // THEN a rig that is slow is seen
+    EXPECT_TRUE(witnesses.sight(drivers::kSecond / 2).rests(safety::kRest_g));
+    // but one that has fallen silent on the wall is not, though no time passes there
+    EXPECT_FALSE(witnesses.sight(2 * drivers::kSecond).known());
 }
 
 }  // namespace

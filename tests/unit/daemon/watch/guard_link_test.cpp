@@ -67,6 +67,40 @@ class FakeGuard {
     int link_ = -1;
 };
 
+TEST(GuardEyes, LackNothingThatIsOverInAMoment) {
+    GuardEyes eyes;
+    GuardStatus guard;
+    guard.note = "gone";
+    std::int64_t now_ns = 1'000'000'000;
+    const auto after = [&](double seconds) {
+        return eyes.lacks(guard, now_ns += static_cast<std::int64_t>(seconds * 1e9));
+    };
+    EXPECT_EQ(after(0), "is not heard: gone") << "which has its own deadline";
+    guard.heard = guard.sees = guard.reaches_shaker = true;
+    EXPECT_EQ(after(0), "");
+    for (bool* one : {&guard.sees, &guard.reaches_shaker}) {
+        // WHEN it is so for a moment, again and again
+        for (int i = 0; i < 5; ++i) {
+            *one = false;
+            EXPECT_EQ(after(1), "");
+            EXPECT_EQ(after(GuardEyes::kPatience_s - 0.1), "");
+            *one = true;
+            EXPECT_EQ(after(0.05), "");
+        }
+        // THEN it is none; and for longer it is said
+        *one = false;
+        EXPECT_EQ(after(0), "");
+        EXPECT_EQ(after(GuardEyes::kPatience_s + 0.1),
+                  one == &guard.sees ? "sees no accelerometer" : "does not reach the shaker");
+        *one = true;
+        EXPECT_EQ(after(0.05), "");
+    }
+    guard.sees = guard.reaches_shaker = false;
+    EXPECT_EQ(after(1), "");
+    EXPECT_EQ(after(GuardEyes::kPatience_s + 0.1),
+              "sees no accelerometer and does not reach the shaker");
+}
+
 class GuardLinkTest : public testing::Test {
   protected:
     static bool until(const auto& holds) {
