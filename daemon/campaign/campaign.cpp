@@ -90,7 +90,10 @@ bool Campaign::done(Time now) const { return shutting_down_ && !active() && !sto
 void Campaign::enter(State state, Time now) {
     state_ = state;
     ports_.rig.shaker.read_only(writes_held_ || state == State::commissioning);
-    if (state == State::paused) ports_.rig.gimbal.forget_position();
+    if (state == State::paused) {
+        ports_.rig.gimbal.forget_position();
+        paused_steady_ = ports_.log.steady_now();
+    }
     excitation_.for_whom(highest_level(), state != State::checking);
     if (state == State::ramping) excitation_.place(here().stop.position_deg);
     if (state == State::ramping || state == State::checking)
@@ -108,7 +111,7 @@ void Campaign::begin(const std::string& by, Time now) {
     started_by_ = by;
     ports_.rig.gimbal.forget_position();
     dwells_ = std::exchange(offer_, {});
-    positions_done_ = positions_before_ = dwells_.size();
+    positions_done_ = dwells_.size();
     plan_stops();
     static_cast<void>(put_first(dwells_));
     offered_stops_.clear();
@@ -150,6 +153,7 @@ Time Campaign::step_once(Time now) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
+    watch_gimbals(now);
     watch_gravity();
     watch_power();
     watch_arming(now);

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -227,6 +225,7 @@ class Campaign {
     [[nodiscard]] bool not_valid_so_far(drivers::Time now);
     [[nodiscard]] static double ratio_at_platform(const Settings& settings);
     void watch_stop(drivers::Time now);
+    void watch_gimbals(drivers::Time now);
     void begin(const std::string& by, drivers::Time now);
     void conclude(drivers::Time now);
     void finish(drivers::Time now);
@@ -234,6 +233,11 @@ class Campaign {
     [[nodiscard]] std::string resume_offer() const;
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
+    [[nodiscard]] std::string not_fit_to_resume(drivers::Time now) const;
+    /// Paused for so long that the arming has ended: it may be armed where it is.
+    [[nodiscard]] bool paused_disarmed() const;
+    void arm(const CommandRequest& request, drivers::Time now);
+    CommandReply resume(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
     CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
@@ -286,15 +290,16 @@ class Campaign {
     int repeats_ = 0;  ///< of the present stop, after flagged dwells
     std::string armed_by_;
     std::string armed_for_, started_by_;
-    drivers::Time armed_steady_ = 0;  ///< when it was armed, by the steady clock
+    drivers::Time armed_steady_ = 0;   ///< when it was armed, by the steady clock
+    drivers::Time paused_steady_ = 0;  ///< likewise, when the newest pause began
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
     bool writes_held_ = false;
-    bool slew_ordered_ = false;  ///< within slew()
+    bool slew_ordered_ = false;            ///< within slew()
+    drivers::Time gimbals_off_since_ = 0;  ///< not left to drift while it shakes; 0: they are
     std::size_t positions_done_ = 0;
-    std::size_t positions_before_ = 0;  ///< of them before a restart
-    double used_before_s_ = 0;          ///< of the campaign, before a restart
+    double used_before_s_ = 0;  ///< of the campaign, before a restart
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;

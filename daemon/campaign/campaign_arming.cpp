@@ -84,7 +84,7 @@ void Campaign::take_over_trip(const std::string& causes, double table_g) {
 }
 
 std::string Campaign::not_fit_to_arm(Time now) const {
-    if (active()) return "a campaign is running";
+    if (active() && !paused_disarmed()) return "a campaign is running";
     if (state_ == State::checking) return check_under_way();
     if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
@@ -123,6 +123,10 @@ std::string Campaign::not_fit_to_acknowledge(Time now) const {
     if (latched && shaker.emergency_stop_open)
         return "the emergency-stop chain is open: close it first";
     if (latched && !shaker.still()) return "the table is not at rest yet";
+    if (stop_.stopping() && stop_.unsettled(now)) {
+        const auto why = stop_.what_moves(now);
+        return "a stop is under way, rest is not measured yet" + (why.empty() ? why : ": " + why);
+    }
     return latched || state_ == State::tripped ? "" : "nothing to acknowledge";
 }
 
@@ -147,33 +151,75 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
         settings_.adaptive ? std::string("positions chosen one by one")
                            : fmt::format("{} positions{}", stops_.size(),
                                          settings_.plan.empty() ? "" : " of " + settings_.plan);
-    const double left_s = static_cast<double>(stops_.size() - offer_.size()) * expected_stop_s();
-    const std::string lasts =
-        settings_.adaptive ? settings_.time_limit_s > 0
-                                 ? "at most " + duration_text(settings_.time_limit_s)
-                                 : std::string("until its targets are met")
-                           : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
+    const auto after = [this](std::size_t done) {
+        const double stops_s = static_cast<double>(stops_.size() - done) * expected_stop_s();
+        return "about " + duration_text(stops_s + times_.opening_s + times_.closing_s);
+    };
+    // What was interrupted is offered: `resume` goes on with it, `start` begins anew.
+    const std::string resumed =
+        active() || offer_.empty() ? "" : ", resumed " + after(offer_.size());
+    const std::string lasts = settings_.adaptive
+                                  ? settings_.time_limit_s > 0
+                                        ? "at most " + duration_text(settings_.time_limit_s)
+                                        : std::string("until its targets are met")
+                                  : after(active() ? at_ : 0) + resumed;
     return fmt::format(
         "{}, plan \"{}\" ({}), up to {:g} g at the table{}{}, platform {}, {}; "
-        "to be started within {}",
+        "to be {} within {}",
         unit, settings_.name, plan, highest_level(),
         frequencies_text(stops_, settings_.frequency_hz),
         profiles_text(stops_) + sweeps_text(stops_),
         settings_.hard_mount ? "bolted hard to it" : "on isolators", lasts,
-        duration_text(settings_.arming_valid_s));
+        active() ? "resumed" : "started", duration_text(settings_.arming_valid_s));
 }
 
-/// Nobody started it: whoever armed may long have gone home.
+/// Nobody started it, or went on with it: whoever armed may long have gone home.
 void Campaign::watch_arming(Time now) {
-    if (state_ != State::armed ||
-        ports_.log.steady_now() - armed_steady_ < drivers::from_seconds(settings_.arming_valid_s)) {
-        return;
-    }
+    const bool pausing = state_ == State::paused && pause_asked_ && !armed_by_.empty();
+    if (state_ != State::armed && !pausing) return;
+    const Time since = pausing ? std::max(armed_steady_, paused_steady_) : armed_steady_;
+    if (ports_.log.steady_now() - since < drivers::from_seconds(settings_.arming_valid_s)) return;
     ports_.log.event(
         Severity::warning,
-        fmt::format("the arming by {} has expired: not started within {}",
-                    std::exchange(armed_by_, {}), duration_text(settings_.arming_valid_s)));
-    enter(State::idle, now);
+        fmt::format("the arming by {} has expired: not {} within {}", std::exchange(armed_by_, {}),
+                    pausing ? "resumed" : "started", duration_text(settings_.arming_valid_s)));
+    if (!pausing) enter(State::idle, now);
+}
+
+bool Campaign::paused_disarmed() const { return state_ == State::paused && armed_by_.empty(); }
+
+void Campaign::arm(const CommandRequest& request, Time now) {
+    armed_for_ = arming_text(request);
+    armed_by_ = request.by;
+    armed_steady_ = ports_.log.steady_now();
+    excitation_.armed();
+    if (state_ == State::paused) return;  // it keeps its place, and its reason
+    reason_.clear();
+    enter(State::armed, now);
+}
+
+/// As much as a start, and whoever armed is still there.
+std::string Campaign::not_fit_to_resume(Time now) const {
+    if (armed_by_.empty())
+        return fmt::format(
+            "paused for more than {}, which has ended the arming: a named person "
+            "arms it first",
+            duration_text(settings_.arming_valid_s));
+    if (auto why = proof_.refusal(utc_ns()); !why.empty()) return why;
+    return not_fit_to_excite(now);
+}
+
+CommandReply Campaign::resume(const CommandRequest& request, Time now) {
+    if (state_ != State::paused && !pause_asked_) return {false, "not paused"};
+    if (state_ == State::paused) {
+        if (const auto why = not_fit_to_resume(now); !why.empty()) return {false, why};
+        vibration_off_.clear();  // looked at anew
+    }
+    pause_asked_ = false;
+    const double ago_s = drivers::to_seconds(ports_.log.steady_now() - armed_steady_);
+    const auto armed = fmt::format("armed by {} {} ago", armed_by_, duration_text(ago_s));
+    ports_.log.event(Severity::info, fmt::format("resumed by {}, {}", request.by, armed));
+    return {true, "resumed, " + armed};
 }
 
 }  // namespace vibrig::campaign

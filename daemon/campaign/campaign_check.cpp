@@ -159,7 +159,7 @@ void Campaign::conclude_check(Time now) {
         ports_.log.event(
             Severity::info,
             fmt::format("loop check: {} {:.4g}{}{}, band {:.4g} to {:.4g}", row.name, row.value,
-                        *row.unit == '\0' ? "" : " ", row.unit, row.low, row.high));
+                        row.unit.empty() ? "" : " ", row.unit, row.low, row.high));
     }
     if (found.message.empty()) {
         ports_.log.event(Severity::info, "loop check in band");

@@ -22,12 +22,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
     switch (request.kind) {
         case Kind::arm:
             if (const auto why = not_fit_to_arm(now); !why.empty()) return refuse(why);
-            armed_by_ = request.by;
-            excitation_.armed();
-            armed_steady_ = ports_.log.steady_now();
-            reason_.clear();
-            enter(State::armed, now);
-            armed_for_ = arming_text(request);
+            arm(request, now);
             return accept("armed for " + armed_for_);
         case Kind::start:
             if (active()) return refuse("a campaign is running, started by " + started_by_);
@@ -48,10 +43,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             return accept("pause before the next position");
         case Kind::resume:
             if (!active() && !offer_.empty()) return resume_interrupted(request, now);
-            if (state_ != State::paused && !pause_asked_) return refuse("not paused");
-            if (state_ == State::paused) vibration_off_.clear();  // looked at anew
-            pause_asked_ = false;
-            return accept("resumed");
+            return resume(request, now);
         case Kind::abort:
             if (active() || state_ == State::armed || state_ == State::checking ||
                 state_ == State::commissioning) {

@@ -1,7 +1,6 @@
 // What is commanded, and what is held against encoders and dwells before the table may move.
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "daemon/campaign/campaign.hpp"

@@ -39,11 +39,40 @@ void Campaign::hold_writes() noexcept {
     ports_.rig.shaker.read_only(true);
 }
 
+/// Gimbals move at rest only, and the platform says so all the time. Whoever else commands them is
+/// seen before they are anywhere.
+void Campaign::watch_gimbals(Time now) {
+    constexpr Time kLasts = 300 * drivers::kMillisecond;  // and is no single status
+    const auto status = ports_.rig.platform();
+    const auto drift = active() && stop_.excited() && !stop_.stopping()
+                           ? ports_.rig.gimbal.drift(status, now)
+                           : drivers::Drift::free;
+    if (drift == drivers::Drift::free) {
+        gimbals_off_since_ = 0;
+        return;
+    }
+    if (gimbals_off_since_ == 0) gimbals_off_since_ = now;
+    const bool silent = drift == drivers::Drift::silent;
+    if (!silent && now - gimbals_off_since_ < kLasts) return;
+    excitation_.order_stop(silent ? "no gimbal status" : "gimbals are led by another");
+    ports_.log.event(
+        Severity::trip,
+        silent ? fmt::format("no gimbal status for {:.1f} s while the table shakes",
+                             drivers::to_seconds(now - status.gimbal_time))
+               : fmt::format("the gimbals are not left alone while the table shakes: {}, command "
+                             "{} echoed",
+                             status.slewing ? "slewing" : "not slewing yet",
+                             status.gimbal_command_echo));
+    if (silent)
+        ports_.rig.gimbals_silent();
+    else
+        ports_.rig.gimbals_led();
+}
+
 void Campaign::watch_stop(Time now) {
-    // A hand, a slew or a torquer on the platform is no shaker.
-    const bool handled = state_ == State::slewing || state_ == State::paused ||
-                         state_ == State::zeroing || state_ == State::levelling || opening() ||
-                         commissioning();
+    // A slew or a torquer is no shaker. A pause is rest like any other, however long it takes.
+    const bool handled = state_ == State::slewing || state_ == State::zeroing ||
+                         state_ == State::levelling || opening() || commissioning();
     switch (stop_.update(now, handled)) {
         case StopMonitor::News::none:
             return;

@@ -237,14 +237,14 @@ double LoopCheck::over_command(drivers::Time asked, double ramp_s) const {
     return slope * ramp_s / settings_.table_g;
 }
 
-LoopCheckStatus::Row LoopCheck::judged(const char* name, const char* unit, double value, double low,
-                                       double high, const std::string& at) {
-    const bool passed = value >= low && value <= high;
-    if (!passed)
+CheckRow LoopCheck::judged(const char* name, const char* unit, double value, double low,
+                           double high, const std::string& at) {
+    CheckRow row{name, unit, value, low, high};
+    if (!row.passed())
         found_wrong_ += fmt::format("{}{}{} {:.4g}{}{}, expected {:.4g} to {:.4g}",
                                     found_wrong_.empty() ? "" : "; ", at, name, value,
                                     *unit == '\0' ? "" : " ", unit, low, high);
-    return {name, unit, value, low, high, passed};
+    return row;
 }
 
 void LoopCheck::row(const char* name, const char* unit, double value, double low, double high) {

@@ -67,7 +67,7 @@ class LoopCheck {
     /// the table does; before finish(), whose verdict it is part of.
     struct AtFrequency {
         double hz = 0, transmission = 0;  ///< of the vibration as it was asked for; as measured
-        std::vector<LoopCheckStatus::Row> rows;
+        std::vector<CheckRow> rows;
         estimator::InStep in_step;
     };
     [[nodiscard]] AtFrequency finish_at(double hz, double low, double high);
@@ -101,8 +101,8 @@ class LoopCheck {
     [[nodiscard]] double most_in_step() const;  ///< arcsec per g at the platform
     void row(const char* name, const char* unit, double value, double low, double high);
     /// Judges a row; `at` stands before its name where it is out of band.
-    LoopCheckStatus::Row judged(const char* name, const char* unit, double value, double low,
-                                double high, const std::string& at);
+    CheckRow judged(const char* name, const char* unit, double value, double low, double high,
+                    const std::string& at);
 
     LoopCheckSettings settings_;
     estimator::Settings rig_;

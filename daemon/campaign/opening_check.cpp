@@ -21,9 +21,7 @@ constexpr drivers::Time kComesToRest = 3 * drivers::kSecond, kSpare = 15 * drive
 constexpr double kSlewGuess_s = 25;
 
 std::string in_one(const std::vector<std::string>& all) {
-    std::string text;
-    for (const auto& one : all) text += (text.empty() ? "" : "; ") + one;
-    return text;
+    return fmt::format("{}", fmt::join(all, "; "));
 }
 
 /// Of the readings, least squares; angles may pass half a turn.

@@ -81,6 +81,10 @@ class Rig {
     virtual void disobeyed(bool) {}
     /// The table moves though nothing was asked for.
     virtual void uncommanded() {}
+    /// While it shakes the gimbals follow somebody else.
+    virtual void gimbals_led() {}
+    /// While it shakes nobody says what the gimbals do.
+    virtual void gimbals_silent() {}
     /// It moves otherwise than asked for.
     virtual void wrong_vibration() {}
     /// Motion in step and motion across, times what the loop check found; none: not looked for.

@@ -63,7 +63,7 @@ Json in_step_json(const std::vector<FoundInStep>& list) {
 
 std::string to_json(const ProofRecord& r) {
     Json rows = Json::array();
-    for (const ProofRow& row : r.rows) {
+    for (const CheckRow& row : r.rows) {
         rows.push_back({{"name", row.name},
                         {"unit", row.unit},
                         {"value", row.value},

@@ -31,7 +31,7 @@ std::map<std::string, std::string> lines_of(const std::string& keys) {
 }
 
 double value_of(const ProofRecord& record, std::string_view name) {
-    const auto row = std::ranges::find(record.rows, name, &ProofRow::name);
+    const auto row = std::ranges::find(record.rows, name, &CheckRow::name);
     return row == record.rows.end() ? 0 : row->value;
 }
 
@@ -120,7 +120,7 @@ void SafetyProof::row(std::string name, std::string unit, double value, double l
 const ProofRecord& SafetyProof::conclude(std::int64_t utc_ns, const std::string& why) {
     record_.utc_ns = utc_ns;
     record_.message = why;
-    for (const ProofRow& row : record_.rows) {
+    for (const CheckRow& row : record_.rows) {
         if (row.passed()) continue;
         record_.message += fmt::format("{}{} {:.4g}{}{}, expected {:.4g} to {:.4g}",
                                        record_.message.empty() ? "" : "; ", row.name, row.value,
@@ -275,9 +275,7 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
     status.utc_ns = newest.utc_ns;
     status.passed = newest.passed;
     status.message = newest.message;
-    status.rows.clear();
-    for (const ProofRow& row : newest.rows)
-        status.rows.push_back({row.name, row.unit, row.value, row.low, row.high, row.passed()});
+    status.rows = newest.rows;
     status.history.clear();
     for (std::size_t i = history_.size() - std::min(history_.size(), kShown); i < history_.size();
          ++i) {

@@ -24,13 +24,6 @@ struct ProofSettings {
     std::string keys;
 };
 
-/// One thing that a proof measured.
-struct ProofRow {
-    std::string name, unit;
-    double value = 0, low = 0, high = 0;
-    [[nodiscard]] bool passed() const { return value >= low && value <= high; }
-};
-
 /// What the loop check found at one frequency of the plan, against which dwells there are held.
 struct FoundInStep {
     double hz = 0;  ///< of the vibration as it was asked for
@@ -46,7 +39,7 @@ struct ProofRecord {
     bool emergency_stop = false;  ///< its button was pressed, and the rig obeyed
     std::string button;           ///< which one was; empty: nobody said
     std::string message;          ///< why it did not pass
-    std::vector<ProofRow> rows;
+    std::vector<CheckRow> rows;
     PadRingDown pads;
     double pads_hz = 0, pads_damping = 0;
     double transmission = 0;  ///< platform over table, of a loop check in band; 0: not measured

@@ -52,9 +52,9 @@ class StopMonitor {
     [[nodiscard]] rt::Rest rest(drivers::Time now) const { return rest_ ? rest_(now) : rt::Rest{}; }
 
     enum class News : std::uint8_t { none, confirmed, disobeyed, uncommanded };
-    /// Each is reported once. `handled`: gimbals or people move the platform, whose accelerometers
-    /// then show nothing of the table below it. Where a table accelerometer shows it, they never
-    /// do.
+    /// Each is reported once. `handled`: gimbals or people move the platform, so that its
+    /// accelerometers tell of the table below it only by what no slew does. Where a table
+    /// accelerometer shows the table, they are not asked.
     [[nodiscard]] News update(drivers::Time now, bool handled = false);
     [[nodiscard]] bool disobeyed() const noexcept { return disobeyed_; }
     /// Once it is at rest.

@@ -64,12 +64,6 @@ std::string change(const Keys& proven, const Keys& now, std::string& moved) {
     return {};
 }
 
-std::string joined(const std::vector<std::string>& words) {
-    std::string text;
-    for (const auto& word : words) text += (text.empty() ? "" : ", ") + word;
-    return text;
-}
-
 std::string read_text(const std::string& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return {};  // nobody waits at a pipe
@@ -175,12 +169,12 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             if (device_.empty()) proven.erase(kDevice);
             s.why = change(proven, keys_.at(part), s.moved);
             if (!s.why.empty())
-                s.why += fmt::format(" by {} on {}", joined(r.by), date_of(r.utc_ns));
+                s.why += fmt::format(" by {} on {}", fmt::join(r.by, ", "), date_of(r.utc_ns));
             else if (r.meaning != kMeaning)
                 s.why = fmt::format("version {} counts its keys otherwise", r.version);
             else if (!of_the_shaker(part) &&
                      (r.by.size() < 2 || journal::same_person(r.by[0], r.by[1])))
-                s.why = fmt::format("proven by {}, two persons are asked", joined(r.by));
+                s.why = fmt::format("proven by {}, two persons are asked", fmt::join(r.by, ", "));
             else if (age_days < 0)
                 s.why = fmt::format("proven on {}, which is yet to come: look at the clock",
                                     instant_of(r.utc_ns));

@@ -15,9 +15,7 @@ constexpr double kRateTolerance = 0.01;
 std::string quoted(const std::string& text) { return "\"" + text + "\""; }
 
 std::string one_of(const std::vector<std::string>& names) {
-    std::string text;
-    for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-    return text.empty() ? "none" : text;
+    return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 }  // namespace

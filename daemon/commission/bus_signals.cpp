@@ -20,12 +20,6 @@ bool wraps_around(const proto::Signal& signal) {
            signal.length < 53;
 }
 
-std::string names_in(const std::vector<std::string>& names) {
-    std::string text;
-    for (const auto& name : names) text += (text.empty() ? "" : " ") + name;
-    return text;
-}
-
 }  // namespace
 
 const char* name_of(BusSignals::Kind kind) noexcept {
@@ -200,7 +194,7 @@ std::string table_of(const BusSignals& bus, bool turned) {
         if (s.kind == BusSignals::Kind::counter) counters.push_back(s.name);
     }
     const auto line = [&text](const char* what, const std::vector<std::string>& names) {
-        if (!names.empty()) text += std::string(what) + names_in(names) + "\n";
+        if (!names.empty()) text += fmt::format("{}{}\n", what, fmt::join(names, " "));
     };
     line("not heard: ", bus.missing());
     line("not in the DBC: ", bus.unknown());

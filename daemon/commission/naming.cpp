@@ -45,19 +45,26 @@ double slope_of(const std::vector<Look>& seconds, std::size_t c) {
     return (n * ty - t * y) / (n * tt - t * t);
 }
 
+/// The description began with either parity: 1 or -1, by which the witnesses' odds are those of
+/// what they decide together.
+double decided_parity(const room::EarthFinding& earth) {
+    double sum = 0;
+    for (const auto& witness : earth.witnesses) sum += witness.ln_odds;
+    return std::copysign(1.0, sum);
+}
+
 /// Why the hemisphere that was stated is not the one measured; empty: nothing says so. Its key is
 /// of the record, and would be wrong.
 std::string outvoted_latitude(const room::EarthFinding& earth, double stated_deg) {
-    double sum = 0, latitude = 0;
-    for (const auto& witness : earth.witnesses) {
-        sum += witness.ln_odds;
+    const double parity = decided_parity(earth);
+    double latitude = 0;
+    for (const auto& witness : earth.witnesses)
         if (witness.name == "latitude") latitude = witness.ln_odds;
-    }
-    if (latitude * sum >= 0 || std::abs(latitude) < kSaysNothing) return {};
+    if (latitude * parity >= 0 || std::abs(latitude) < kSaysNothing) return {};
     std::string heard;
     for (const auto& witness : earth.witnesses)
         heard += fmt::format("{}{} {:+.1f}", heard.empty() ? "" : ", ", witness.name,
-                             std::copysign(1.0, sum) * witness.ln_odds);
+                             parity * witness.ln_odds);
     return fmt::format(
         "site.latitude_deg: {:.2f} stated, the {} hemisphere measured, as the others say ({}): "
         "one side is wrong",
@@ -78,10 +85,9 @@ std::vector<std::string> earth_suspects(const room::EarthFinding& earth) {
         keys.push_back(earth.why.substr(0, earth.why.find_first_of(": ")));
         return keys;
     }
-    double sum = 0;
-    for (const auto& witness : earth.witnesses) sum += witness.ln_odds;
+    const double parity = decided_parity(earth);
     for (const auto& witness : earth.witnesses)
-        if (witness.ln_odds * sum < 0 && std::abs(witness.ln_odds) > kSaysNothing)
+        if (witness.ln_odds * parity < 0 && std::abs(witness.ln_odds) > kSaysNothing)
             keys.emplace_back(key_of(witness.name));
     if (keys.empty()) keys = {"accelerometer.matrix", "site.latitude_deg"};
     return keys;
@@ -367,7 +373,8 @@ void Procedure::decide() {
         return conclude(Verdict::refused, wrong.what());
     }
     for (const auto& witness : earth.witnesses)
-        finding_.witnesses.push_back({{"name", witness.name}, {"ln_odds", witness.ln_odds}});
+        finding_.witnesses.push_back(
+            {{"name", witness.name}, {"ln_odds", decided_parity(earth) * witness.ln_odds}});
     tell(fmt::format("F  Earth rate north {:.2f} east {:.2f} up {:.1f} +- {:.1f} deg/h",
                      earth.rate.neu[0], earth.rate.neu[1], earth.rate.neu[2], earth.rate.sigma[2]));
     tell(fmt::format("   latitude {:.2f} or its negative ({:.2f} stated), azimuth {:.2f} deg",

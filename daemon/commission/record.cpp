@@ -1,5 +1,6 @@
 #include "daemon/commission/record.hpp"
 
+#include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
 #include <array>
@@ -126,12 +127,8 @@ Keys keys_of(Part part, const configuration::Loaded& loaded) {
 }
 
 std::string instant_of(std::int64_t utc_ns) {
-    const auto seconds = static_cast<std::time_t>(utc_ns / 1'000'000'000);
-    std::tm time{};
-    gmtime_r(&seconds, &time);
-    std::array<char, 32> text{};
-    std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &time);
-    return text.data();
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}",
+                       fmt::gmtime(static_cast<std::time_t>(utc_ns / 1'000'000'000)));
 }
 
 std::string date_of(std::int64_t utc_ns) { return instant_of(utc_ns).substr(0, 10); }

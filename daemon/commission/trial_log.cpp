@@ -7,7 +7,6 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "daemon/commission/record.hpp"
+#include "daemon/journal/signed_head.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 
@@ -23,11 +23,6 @@ namespace vibrig::commission {
 namespace {
 
 constexpr const char* kName = "registers.jsonl";
-
-std::int64_t wall_ns() {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
 
 [[noreturn]] void cannot(const std::string& path, const char* what) {
     throw std::runtime_error(path + ": cannot " + what + ": " + std::strerror(errno));
@@ -44,35 +39,33 @@ std::string identity() {
     return text;
 }
 
+/// What a trial writes; null: not stated.
+std::array<std::pair<const char*, const proto::Register*>, 6> written_roles(
+    const proto::ShakerRegisters& map) {
+    return {{{"frequency", &map.frequency},
+             {"amplitude", &map.amplitude},
+             {"ramp_time", &map.ramp_time},
+             {"watchdog_timeout", &map.watchdog_timeout},
+             {"watchdog", map.watchdog ? &*map.watchdog : nullptr},
+             {"run", &map.run}}};
+}
+
 /// The stated register that begins there; empty: none.
 std::string role_at(const proto::ShakerRegisters& map, std::uint16_t address) {
-    const auto is = [&](const proto::Register& reg) {
-        return reg.table == proto::RegisterTable::holding && reg.address == address;
-    };
-    const std::array<std::pair<const char*, const proto::Register*>, 6> roles{
-        {{"frequency", &map.frequency},
-         {"amplitude", &map.amplitude},
-         {"ramp_time", &map.ramp_time},
-         {"watchdog_timeout", &map.watchdog_timeout},
-         {"watchdog", map.watchdog ? &*map.watchdog : nullptr},
-         {"run", &map.run}}};
-    for (const auto& [name, reg] : roles)
-        if (reg != nullptr && is(*reg)) return name;
+    for (const auto& [name, reg] : written_roles(map))
+        if (reg != nullptr && reg->table == proto::RegisterTable::holding &&
+            reg->address == address)
+            return name;
     return {};
 }
 
 /// As it counts; nothing: of no stated register.
 TrialLog::Json value_of(const proto::ShakerRegisters& map, const std::string& role,
                         std::span<const std::uint16_t> words) {
-    const auto* const reg = role == "frequency"          ? &map.frequency
-                            : role == "amplitude"        ? &map.amplitude
-                            : role == "ramp_time"        ? &map.ramp_time
-                            : role == "watchdog_timeout" ? &map.watchdog_timeout
-                            : role == "watchdog"         ? &*map.watchdog
-                            : role == "run"              ? &map.run
-                                                         : nullptr;
-    if (reg == nullptr || reg->words() != words.size()) return nullptr;
-    return proto::decode(*reg, words);
+    for (const auto& [name, reg] : written_roles(map))
+        if (role == name && reg != nullptr && reg->words() == words.size())
+            return proto::decode(*reg, words);
+    return nullptr;
 }
 
 }  // namespace
@@ -90,7 +83,7 @@ TrialLog::TrialLog(const std::string& folder, std::string by)
 TrialLog::~TrialLog() { ::close(file_); }
 
 void TrialLog::add(const char* what, Json data) {
-    const std::int64_t now = wall_ns();
+    const std::int64_t now = journal::utc_now();
     Json line{{"utc", instant_of(now)},
               {"utc_ns", now},
               {"by", by_},

@@ -8,14 +8,15 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 #include <string_view>
 
 #include "daemon/configuration/cross_checks.hpp"
 #include "daemon/configuration/derived.hpp"
 #include "daemon/configuration/forms.hpp"
-#include "daemon/configuration/nearest.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
+#include "proto/edits.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::configuration {
@@ -24,6 +25,43 @@ namespace {
 
 /// 10 000 positions are some 300 kB.
 constexpr std::size_t kLargestFile = 4U << 20U;
+
+std::string last_part(const std::string& key) { return key.substr(key.rfind('.') + 1); }
+
+std::set<std::string> candidates(bool table) {
+    std::set<std::string> names;
+    for (const Key& key : schema()) {
+        if (!table) {
+            names.insert(key.name);
+            continue;
+        }
+        for (std::size_t dot = key.name.find('.'); dot != std::string::npos;
+             dot = key.name.find('.', dot + 1)) {
+            names.insert(key.name.substr(0, dot));
+        }
+    }
+    return names;
+}
+
+/// The known key (or table) that a person most likely meant; empty if none is near.
+std::string nearest_key(const std::string& key, bool table) {
+    constexpr std::size_t kLongest = 100;
+    if (key.size() > kLongest) {
+        return "";
+    }
+    std::string best;
+    std::size_t best_edits = std::max<std::size_t>(2, last_part(key).size() / 3) + 1;
+    for (const std::string& name : candidates(table)) {
+        const std::size_t whole = proto::edits(key, name);
+        // The right name in the wrong section is one mistake, whatever the sections are called.
+        const std::size_t part = last_part(key) == last_part(name) ? 1 : whole;
+        if (std::min(whole, part) < best_edits) {
+            best_edits = std::min(whole, part);
+            best = name;
+        }
+    }
+    return best;
+}
 
 /// Takes every value of a file to its key.
 class Reader {

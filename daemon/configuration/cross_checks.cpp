@@ -15,12 +15,10 @@ namespace vibrig::configuration {
 
 namespace {
 
-bool starts_with(const std::string& text, const char* prefix) { return text.rfind(prefix, 0) == 0; }
-
 bool loopback(const std::string& host) {
     const bool dotted = std::all_of(host.begin(), host.end(),
                                     [](char ch) { return ch == '.' || (ch >= '0' && ch <= '9'); });
-    return host == "localhost" || host == "::1" || (dotted && starts_with(host, "127."));
+    return host == "localhost" || host == "::1" || (dotted && host.starts_with("127."));
 }
 
 }  // namespace
@@ -111,6 +109,7 @@ void CrossCheck::for_daemon() {
     archiving();
     adaptive();
     rest();
+    stops_in_time();
     set_points_fit();
     limits();
     frequency();
@@ -308,8 +307,7 @@ void CrossCheck::simulated_rig() {
     // A switch that takes a demand away must not be set on a rig that can hurt: vcan alone is no
     // proof, since gateways use it; a controller on this machine is a program.
     const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
-    const bool here =
-        serial ? starts_with(c_.shaker.device, "/dev/pts/") : loopback(c_.shaker.host);
+    const bool here = serial ? c_.shaker.device.starts_with("/dev/pts/") : loopback(c_.shaker.host);
     if (sound({"can.port", "can.interface"}) &&
         c_.can.kind == drivers::CanPortSettings::Kind::socketcan && is_hardware(c_.can.interface)) {
         // A gateway on this machine may lead to a real controller.
@@ -331,8 +329,8 @@ void CrossCheck::rig_clock() {
     // The rig's clock stands still when the bus is silent: deadlines and watchdogs would never fire
     // on real hardware.
     const bool simulated_bus = c_.can.kind == drivers::CanPortSettings::Kind::seqpacket ||
-                               starts_with(c_.can.interface, "vcan") ||
-                               starts_with(c_.can.interface, "vxcan");
+                               c_.can.interface.starts_with("vcan") ||
+                               c_.can.interface.starts_with("vxcan");
     if (sound({"can.port", "can.interface"}) && !simulated_bus) {
         refuse({"clock.source"}, "\"rig\" on the CAN interface " + c_.can.interface,
                "can.port \"seqpacket\" or an interface named vcan* or vxcan*");

@@ -36,6 +36,8 @@ class CrossCheck {
     void doors();
     void status_signals();
     void rest();
+    void stops_in_time();
+    void seen_in_time();
     void adaptive();
     void rig_clock();
     void simulated_rig();

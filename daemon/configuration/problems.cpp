@@ -1,7 +1,6 @@
 #include "daemon/configuration/problems.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "proto/text.hpp"

@@ -1,6 +1,6 @@
-// What a rig that can hurt somebody must state: Vibrig's defaults are those of its simulated rig.
+// What a rig that can hurt somebody must state, Vibrig's defaults being those of its simulated rig;
+// and what is too late for a stop.
 #include <algorithm>
-#include <array>
 #include <string>
 #include <vector>
 
@@ -14,6 +14,7 @@ namespace vibrig::configuration {
 
 void CrossCheck::real_rig() {
     registers_stated();
+    seen_in_time();
     if (sound({"platform", "uncertainty"})) {
         for (const auto& doubt : estimator::doubtful_keys(c_.estimator)) {
             const auto place = places_.find(doubt.key.substr(0, doubt.key.find('[')));
@@ -30,6 +31,49 @@ void CrossCheck::real_rig() {
             refuse({"accelerometer.range_g"}, plain(range) + " g",
                    rounded(most) + " g at least: 1 g and transmission x the highest table_g");
     }
+}
+
+/// A stop whose window of rest leaves no time for stopping would never be obeyed.
+void CrossCheck::stops_in_time() {
+    if (sound({"shaker.backoff_min_ms"}) && c_.shaker.backoff_min > drivers::kSecond) {
+        refuse({"shaker.backoff_min_ms"},
+               plain(static_cast<double>(c_.shaker.backoff_min) / 1e6) + " ms",
+               "1000 ms at most: a link that was lost is to be there again in time for a stop");
+    }
+    if (!sound({"shaker.rest_window_s", "shaker.stop_deadline_s", "can.sample_rate_hz"})) return;
+    constexpr double kFewest = 8, kToStop_s = 1;  // samples of a window; s
+    const double deadline_s = c_.campaign.stop.deadline_s;
+    const double window_s = std::max(c_.campaign.rest.window_s,
+                                     kFewest * drivers::to_seconds(c_.assembler.sample_period));
+    const double most_s = deadline_s - std::min(kToStop_s, deadline_s / 2);
+    if (window_s <= most_s) return;
+    refuse(
+        {"shaker.rest_window_s", "shaker.stop_deadline_s", "can.sample_rate_hz"},
+        "a window of rest of " + rounded(window_s) + " s with stop_deadline_s " + plain(deadline_s),
+        rounded(most_s) + " s at most: the table has to stop before it can be seen to rest; a " +
+            "window is of rest_window_s, and of 8 samples at least");
+}
+
+/// What is noticed after minutes is not noticed. A program on a busy machine may be late.
+void CrossCheck::seen_in_time() {
+    using drivers::kSecond;
+    const auto at_most = [this](const char* key, drivers::Time found, drivers::Time most,
+                                const std::string& why) {
+        if (!sound({key}) || found <= most) return;
+        refuse({key}, plain(static_cast<double>(found) / 1e6) + " ms",
+               rounded(static_cast<double>(most) / 1e6) + " ms at most: " + why);
+    };
+    // A slow bus may have two periods.
+    at_most("can.stale_deadline_ms", c_.assembler.stale_deadline,
+            std::max(kSecond, 2 * c_.assembler.sample_period),
+            "so long the table would shake on with nobody measuring it");
+    at_most("gimbal.status_deadline_ms", c_.gimbal.status_deadline, kSecond,
+            "so long the table would shake on under a platform that has failed");
+    const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
+    at_most("shaker.response_timeout_ms", c_.shaker.response_timeout,
+            serial ? kSecond / 2 : kSecond,
+            serial ? "so long a stop waits for the request before it, which no serial line cuts off"
+                   : "so long a stop that is not answered waits before it is written again");
 }
 
 void CrossCheck::registers_stated() {

@@ -46,7 +46,7 @@ std::vector<Key> port_keys() {
         milliseconds("can.join_deadline_ms", assembler(&A::join_deadline), {1, 10'000},
                      "a sample is given out this long after its first frame"),
         milliseconds("can.stale_deadline_ms", assembler(&A::stale_deadline), {1, 60'000},
-                     "a channel without a value for longer is stale"),
+                     "a channel without a value for longer is stale; on a real rig 1000 at most"),
     };
 }
 
@@ -87,7 +87,7 @@ std::vector<Key> gimbal_keys() {
         text("gimbal.message", gimbal(&G::message), "a message name",
              "command with signals Outer, Inner, Azimuth, Mode, Counter", identifier_rule),
         milliseconds("gimbal.status_deadline_ms", gimbal(&G::status_deadline), {10, 60'000},
-                     "an older status is not believed"),
+                     "an older status is not believed; on a real rig 1000 at most"),
         seconds("gimbal.slew_timeout_s", gimbal(&G::slew_timeout), {1, 3600},
                 "from command to in position"),
         milliseconds("gimbal.repeat_ms", gimbal(&G::repeat), {10, 60'000},

@@ -38,14 +38,14 @@ std::vector<Key> link_keys() {
         integer("shaker.baud", link(&S::baud), "bit/s", 300, 4'000'000, "rtu: speed, 8E1"),
         integer("shaker.unit", link(&S::unit), "", 1, 255, "Modbus unit (slave) id"),
         milliseconds("shaker.response_timeout_ms", link(&S::response_timeout), {10, 60'000},
-                     "of one request"),
+                     "of one request; on a real rig 1000 at most, 500 over rtu"),
         milliseconds("shaker.poll_period_ms", link(&S::poll_period), {10, 60'000},
                      "between read-backs"),
         milliseconds("shaker.watchdog_period_ms", link(&S::watchdog_period), {10, 60'000},
                      "between feeds of the controller's watchdog; 1000 at most, three of them are "
                      "its timeout"),
         milliseconds("shaker.backoff_min_ms", link(&S::backoff_min), {10, 60'000},
-                     "before the first reconnect, doubled each time"),
+                     "before the first reconnect, doubled each time; 1000 at most"),
         milliseconds("shaker.backoff_max_ms", link(&S::backoff_max), {10, 600'000},
                      "longest wait before a reconnect"),
         text("shaker.plate", at(&C::shaker_plate), "at most 120 bytes",
@@ -63,7 +63,8 @@ std::vector<Key> link_keys() {
         number("shaker.rest_g", rest(&R::limit_g), "g", {1e-6, safety::kMoving_g},
                "at rest: rms of the accelerometers below; 6 noise.accelerometer_g at least"),
         number("shaker.rest_window_s", rest(&R::window_s), "s", {0.1, 10},
-               "of that rms; 8 samples at least, where they come slower"),
+               "of that rms; 8 samples at least, where they come slower; 1 s, or half of it, "
+               "below stop_deadline_s"),
 
         number("shaker.limits.acceleration_g", limits(&L::max_acceleration_g), "g", {0.001, 1000},
                "largest peak acceleration at the table"),

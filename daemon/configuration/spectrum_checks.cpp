@@ -1,6 +1,5 @@
 // Frequencies, levels and profiles against the samples, the shaker's limits and the accelerometers.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <sstream>
-#include <string_view>
 #include <system_error>
 
 #include "proto/text.hpp"

@@ -7,6 +7,8 @@
 #include <array>
 #include <chrono>
 
+#include "proto/json_text.hpp"
+
 namespace vibrig::drivers {
 
 namespace {
@@ -30,24 +32,6 @@ constexpr auto kCommandPeriod = std::chrono::seconds(2);
     std::array<char, 32> text{};
     const auto size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &fields);
     return {text.data(), size};
-}
-
-/// The inside of a JSON string. What is not ASCII is taken to be UTF-8.
-[[nodiscard]] std::string json_text(const std::string& text) {
-    constexpr std::string_view kHex = "0123456789abcdef";
-    std::string escaped;
-    for (const char ch : text) {
-        const auto code = static_cast<unsigned char>(ch);
-        if (ch == '"' || ch == '\\') {
-            escaped += {'\\', ch};
-        } else if (code < 0x20) {
-            escaped += "\\u00";
-            escaped += {kHex[code >> 4U], kHex[code & 15U]};
-        } else {
-            escaped += ch;
-        }
-    }
-    return escaped;
 }
 
 }  // namespace
@@ -105,9 +89,11 @@ AnnunciatorStatus Annunciator::status() const {
 std::string Annunciator::to_json(HornPattern kind, const std::string& text) const {
     // Escaped six times as long at most: the whole stays below PageCommand::kLongestText.
     constexpr std::size_t kLongest = 600;
-    return R"({"source":")" + json_text(settings_.source) + R"(","kind":")" + name_of(kind) +
-           R"(","time":")" + utc_text() + R"(","text":")" + json_text(text.substr(0, kLongest)) +
-           "\"}\n";
+    return proto::json_text(nlohmann::ordered_json{{"source", settings_.source},
+                                                   {"kind", name_of(kind)},
+                                                   {"time", utc_text()},
+                                                   {"text", text.substr(0, kLongest)}}) +
+           '\n';
 }
 
 void Annunciator::sound(Time now) {

@@ -1,6 +1,8 @@
 #include "drivers/annunciator/horn.hpp"
 
-#include <algorithm>
+#include <array>
+
+#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 
@@ -22,17 +24,8 @@ ShakerSettings link_settings(const HornSettings& settings) {
 }  // namespace
 
 const char* name_of(HornPattern pattern) noexcept {
-    switch (pattern) {
-        case HornPattern::none:
-            return "none";
-        case HornPattern::alarm:
-            return "alarm";
-        case HornPattern::abort:
-            return "abort";
-        case HornPattern::disobeyed:
-            return "disobeyed";
-    }
-    return "?";
+    static constexpr std::array kWords{"none", "alarm", "abort", "disobeyed"};
+    return proto::word_of(kWords, pattern);
 }
 
 bool horn_sounds(HornPattern pattern, Time since) noexcept {

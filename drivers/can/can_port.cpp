@@ -1,37 +1,20 @@
 #include "drivers/can/can_port.hpp"
 
+#include <array>
+
 #include "drivers/can/can_port_base.hpp"
+#include "proto/word_of.hpp"
 
 namespace vibrig::drivers {
 
 const char* name_of(ControllerState state) noexcept {
-    switch (state) {
-        case ControllerState::active:
-            return "active";
-        case ControllerState::warning:
-            return "warning";
-        case ControllerState::passive:
-            return "passive";
-        case ControllerState::bus_off:
-            return "bus off";
-    }
-    return "unknown";
+    static constexpr std::array kWords{"active", "warning", "passive", "bus off"};
+    return proto::word_of(kWords, state, "unknown");
 }
 
 const char* name_of(PortState state) noexcept {
-    switch (state) {
-        case PortState::absent:
-            return "absent";
-        case PortState::connecting:
-            return "connecting";
-        case PortState::running:
-            return "running";
-        case PortState::degraded:
-            return "degraded";
-        case PortState::fault:
-            return "fault";
-    }
-    return "?";
+    static constexpr std::array kWords{"absent", "connecting", "running", "degraded", "fault"};
+    return proto::word_of(kWords, state);
 }
 
 std::unique_ptr<CanPort> make_can_port(boost::asio::io_context& io,

@@ -148,6 +148,13 @@ GimbalState Gimbal::follow(const PlatformStatus& status, Time now) noexcept {
     return there ? GimbalState::in_position : GimbalState::slewing;
 }
 
+Drift Gimbal::drift(const PlatformStatus& status, Time now) const noexcept {
+    if (!commanded_ || !echoed_ || mode_ != Mode::free_drift) return Drift::free;
+    if (now - status.gimbal_time > settings_.status_deadline) return Drift::silent;
+    if (status.gimbal_command_echo != counter_) return Drift::led;
+    return status.slewing ? Drift::slews : Drift::free;
+}
+
 Time Gimbal::next_deadline() const noexcept {
     if (!commanded_ || state_ == GimbalState::timed_out || state_ == GimbalState::idle)
         return kNever;

@@ -42,6 +42,14 @@ enum class GimbalState : std::uint8_t {
 };
 [[nodiscard]] const char* name_of(GimbalState state) noexcept;
 
+/// Of a platform that was released: whether it is left to drift.
+enum class Drift : std::uint8_t {
+    free,  ///< or not released by us
+    slews,
+    led,     ///< by somebody else's command
+    silent,  ///< status older than status_deadline
+};
+
 /// Sends gimbal commands and follows them to "in position". Control thread only.
 class Gimbal {
   public:
@@ -66,6 +74,8 @@ class Gimbal {
     GimbalState update(const PlatformStatus& status, Time now) noexcept;
     [[nodiscard]] Time next_deadline() const noexcept;
     [[nodiscard]] GimbalState state() const noexcept { return state_; }
+    /// By the platform's own word.
+    [[nodiscard]] Drift drift(const PlatformStatus& status, Time now) const noexcept;
 
   private:
     enum class Mode : std::uint8_t { free_drift = 0, slew = 1, slew_with_increments = 2 };

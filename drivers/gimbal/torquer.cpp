@@ -5,7 +5,6 @@
 #include <span>
 #include <string_view>
 
-#include "drivers/sample/assembler.hpp"
 #include "drivers/sample/signal_binding.hpp"
 
 namespace vibrig::drivers {

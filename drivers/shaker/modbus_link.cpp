@@ -224,9 +224,10 @@ ModbusLink::Connection ModbusLink::connect_rtu(std::string& why) {
     return Connection::open;
 }
 
-/// Something to read before anything was asked: the end of the connection, or a reply to a request
-/// given up.
-Reply ModbusLink::stale_input() noexcept {
+/// No connection, or something to read before anything was asked: the connection's end, or a reply
+/// to a request given up.
+Reply ModbusLink::hindered() noexcept {
+    if (!connected_) return {ReplyKind::lost, ENOTCONN};
     pollfd events{modbus_get_socket(context_.get()), POLLIN, 0};
     if (::poll(&events, 1, 0) <= 0) return {};
     std::uint8_t byte = 0;
@@ -249,8 +250,7 @@ Reply ModbusLink::reply_of(int result, int expected, int error) noexcept {
 
 Reply ModbusLink::read(proto::RegisterTable table, std::uint16_t address,
                        std::span<std::uint16_t> words) noexcept {
-    if (!connected_) return {ReplyKind::lost, ENOTCONN};
-    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    if (const Reply hindrance = hindered(); !hindrance.ok()) return hindrance;
     const int count = static_cast<int>(words.size());
     const int result =
         table == proto::RegisterTable::holding
@@ -260,8 +260,7 @@ Reply ModbusLink::read(proto::RegisterTable table, std::uint16_t address,
 }
 
 Reply ModbusLink::write(std::uint16_t address, std::span<const std::uint16_t> words) noexcept {
-    if (!connected_) return {ReplyKind::lost, ENOTCONN};
-    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    if (const Reply hindrance = hindered(); !hindrance.ok()) return hindrance;
     const int count = static_cast<int>(words.size());
     const int result = count == 1
                            ? modbus_write_register(context_.get(), address, words[0])
@@ -270,8 +269,7 @@ Reply ModbusLink::write(std::uint16_t address, std::span<const std::uint16_t> wo
 }
 
 Reply ModbusLink::identify(std::string& text) noexcept {
-    if (!connected_) return {ReplyKind::lost, ENOTCONN};
-    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    if (const Reply hindrance = hindered(); !hindrance.ok()) return hindrance;
     std::array<std::uint8_t, MODBUS_MAX_PDU_LENGTH> bytes{};
     const int result = modbus_report_slave_id(context_.get(), int(bytes.size()), bytes.data());
     if (result < 0) return reply_of(result, 0, errno);
@@ -283,8 +281,7 @@ Reply ModbusLink::identify(std::string& text) noexcept {
 }
 
 Reply ModbusLink::read_coil(std::uint16_t address, bool& on) noexcept {
-    if (!connected_) return {ReplyKind::lost, ENOTCONN};
-    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    if (const Reply hindrance = hindered(); !hindrance.ok()) return hindrance;
     std::uint8_t bit = 0;
     const int result = modbus_read_bits(context_.get(), address, 1, &bit);
     on = bit != 0;
@@ -292,8 +289,7 @@ Reply ModbusLink::read_coil(std::uint16_t address, bool& on) noexcept {
 }
 
 Reply ModbusLink::write_coil(std::uint16_t address, bool on) noexcept {
-    if (!connected_) return {ReplyKind::lost, ENOTCONN};
-    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    if (const Reply hindrance = hindered(); !hindrance.ok()) return hindrance;
     const int result = modbus_write_bit(context_.get(), address, on ? 1 : 0);
     return reply_of(result, 1, errno);
 }

@@ -4,9 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "drivers/shaker/shaker.hpp"
 
@@ -87,7 +85,7 @@ class ModbusLink {
     [[nodiscard]] Connection connect_address(const addrinfo& address, std::string& why);
     [[nodiscard]] Connection connect_rtu(std::string& why);
     void arm_cutter(int socket) noexcept;
-    [[nodiscard]] Reply stale_input() noexcept;
+    [[nodiscard]] Reply hindered() noexcept;
     [[nodiscard]] static Reply reply_of(int result, int expected, int error) noexcept;
 
     ShakerSettings settings_;

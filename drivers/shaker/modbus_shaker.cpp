@@ -13,6 +13,9 @@ namespace {
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
 // left shaking is to see one command go out. 100 ms, and as much again for the way there.
 constexpr Time kStopAlone = 200 * kMillisecond;
+// Between two writes of a stop that is not confirmed, and between two attempts to connect for it:
+// at most, whatever everything else waits for.
+constexpr Time kStopRepeat = 200 * kMillisecond;
 // Between two reads of the watchdog's timeout; a second at most, with the request itself.
 constexpr Time kTimeoutPeriod = 500 * kMillisecond;
 
@@ -162,7 +165,11 @@ void ModbusShaker::run() noexcept {
 /// One round: the most urgent thing, or sleep until the next is due.
 void ModbusShaker::work(Time now) {
     drop_void_set_point();
+    const std::uint64_t ordered = stops();  // first: a stop that comes meanwhile is another one
     const bool stop = stop_pending();
+    // Whoever orders it again does not wait for the turn of the last one.
+    if (std::exchange(stops_seen_, ordered) != ordered)
+        stop_tried_ = connect_tried_for_stop_ = false;
     if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = joint_in_vain_ = false;
     if (stop) hung_up_until_ = 0;
     const Time silent_until = hung_up_until_.load();
@@ -198,8 +205,7 @@ void ModbusShaker::try_connect(Time now) {
     const auto result = link_.connect(why);
     now = clock_.now();
     if (result != ModbusLink::Connection::open) {
-        // A stop does not back off.
-        next_attempt_ = now + (stop_pending() ? settings_.backoff_min : backoff_);
+        next_attempt_ = now + (stop_pending() ? stop_repeat() : backoff_);
         backoff_ = std::min(2 * backoff_, settings_.backoff_max);
         set_state(
             result == ModbusLink::Connection::failed ? LinkState::connecting : LinkState::fault,
@@ -231,7 +237,7 @@ void ModbusShaker::close_link() {
 
 void ModbusShaker::lose_link(const std::string& why) {
     close_link();
-    next_attempt_ = clock_.now() + (stop_pending() ? settings_.backoff_min : backoff_);
+    next_attempt_ = clock_.now() + (stop_pending() ? stop_repeat() : backoff_);
     backoff_ = std::min(2 * backoff_, settings_.backoff_max);
     set_state(LinkState::connecting, why + "; connecting again");
 }
@@ -362,7 +368,7 @@ Reply ModbusShaker::try_ramp(std::span<const std::uint16_t> ramp) {
 void ModbusShaker::write_stop(Time now) {
     stop_tried_ = true;
     commanded_.reset();
-    next_stop_ = now + settings_.backoff_min;
+    next_stop_ = now + stop_repeat();
     // A stop at rest may make the device forget the fault that it holds. What a process finds at
     // its first connection is read before; once, whatever comes of it.
     if (!std::exchange(looked_, true)) {
@@ -396,6 +402,11 @@ void ModbusShaker::write_stop(Time now) {
     next_poll_ = clock_.now();
     next_feed_ = std::max(next_poll_, stop_alone_until_);
     settle("stopped");
+}
+
+/// A stop does not back off.
+Time ModbusShaker::stop_repeat() const noexcept {
+    return std::min(settings_.backoff_min, kStopRepeat);
 }
 
 void ModbusShaker::drop_void_set_point() noexcept {

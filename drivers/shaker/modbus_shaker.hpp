@@ -85,6 +85,7 @@ class ModbusShaker final : public Shaker {
                                  std::span<const std::uint16_t> words);
 
     void write_stop(Time now);
+    [[nodiscard]] Time stop_repeat() const noexcept;
     [[nodiscard]] Reply order_stop(std::span<const std::uint16_t> run);
     [[nodiscard]] Reply try_ramp(std::span<const std::uint16_t> ramp);
     void write_set_point();
@@ -160,10 +161,11 @@ class ModbusShaker final : public Shaker {
     bool poll_refused_ = false, feed_refused_ = false;
     bool write_failed_ = false;  ///< until a stop is read back as done
     bool stop_tried_ = false, connect_tried_for_stop_ = false;
-    bool ramp_tried_ = false;     ///< of the stop at hand
-    bool joint_refused_ = false;  ///< the device takes one register at a time
-    bool joint_in_vain_ = false;  ///< of the stop at hand: ordered so, and not read back as done
-    bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
+    std::uint64_t stops_seen_ = 0;  ///< orders of a stop that this thread has taken up
+    bool ramp_tried_ = false;       ///< of the stop at hand
+    bool joint_refused_ = false;    ///< the device takes one register at a time
+    bool joint_in_vain_ = false;    ///< of the stop at hand: ordered so, and not read back as done
+    bool timeout_due_ = false;      ///< the watchdog's timeout is to be written
     WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
     double timeout_read_s_ = 0;
     int asks_left_ = 0;                        ///< who it is

@@ -1170,7 +1170,8 @@ def real(checks, programs, folder):
         stated = {}
         for role, key, value in re.findall(r"^shaker\.registers\.(\w+)\.(type|address|table|word_order|scale|mask) +=  (\S+)", check.stdout, re.M):
             stated.setdefault("shaker.registers." + role, {})[key] = json.loads(value)
-        rig.configure(CAMPAIGN, **r.PATIENT, **stated, commission={"simulated": False, "folder": os.path.join(folder, "commission")})
+        late = {"can": {"stale_deadline_ms": 1000}, "gimbal": {"status_deadline_ms": 1000}, "shaker": {"response_timeout_ms": 1000}}   # as a real rig may be
+        rig.configure(CAMPAIGN, **late, **stated, commission={"simulated": False, "folder": os.path.join(folder, "commission")})
         rig.start_daemon()
         ready = rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("state") == 0, 60)
         checks.check(ready and ready["platform"].get("ready") and not ready.get("simulated"), "a rig that counts as real is ready", rig.logs())

@@ -195,7 +195,7 @@ class Tried:
         rig.modbus_port = 502 if line else int(controller.where.rpartition(":")[2])
         link = {"transport": "rtu", "device": controller.where, "baud": 115200} if line else {}
         stated = {**STATED, **other}
-        rig.configure({"name": "foreign"}, shaker={**link, "response_timeout_ms": 1500}, commission={"simulated": False, "folder": os.path.join(folder, "commission"), "buttons": buttons},
+        rig.configure({"name": "foreign"}, shaker={**link, "response_timeout_ms": 500 if line else 1000}, commission={"simulated": False, "folder": os.path.join(folder, "commission"), "buttons": buttons},
                       **{"shaker.registers." + role: keys for role, keys in stated.items()})
         self.controller, self.text, self.instead = controller, "", {}
         self.command = [os.path.join(programs, "vibrig"), "commission", "registers", "--by", "Ada", "--plate", "a plate", "--json", "--write",

@@ -438,6 +438,9 @@ def check_page(checks, rig, page, address, remote, pki):
     rig.daemon.end()
     until("a lost link is said loudly", "!document.getElementById('alert').hidden && document.getElementById('alert').textContent.startsWith('LINK LOST')")
     page.ask("shot", file=os.path.join(SHOTS, "link-lost.png"), width=1400, height=1000, scheme="light")
+    coloured = page.ask("evaluate", script="['main', '#strip', '.where', '.doing'].filter(e => "
+                        "getComputedStyle(document.querySelector(e)).filter !== 'grayscale(1)')").get("value")
+    checks.equal(coloured, [], "and nothing old has the colours that judge it")
     check_accessible(checks, page, "while the link is lost")
     rig.start_daemon()
     until("the page finds the restarted daemon by itself", "document.getElementById('alert').hidden && " + state + " !== 'recording'", 40)

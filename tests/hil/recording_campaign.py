@@ -496,6 +496,8 @@ def report(checks, rig, folder):
     made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5", "--pdf", "x.pdf")
     # These positions do not determine all coefficients: the result is not valid, and the report says so.
     checks.check(made.returncode == 1 and "not valid" in made.stderr + made.stdout, "a report is written, and its verdict is a no", made.stderr)
+    piped = offline(rig, "report", folder, "-o", "/dev/stdout")
+    checks.check(piped.returncode == 1 and "</html>" in piped.stdout, "into a pipe, too", piped.stderr)
     with open(os.path.join(rig.folder, "x.pdf"), "rb") as file:
         pdf = file.read()
     pages = len(re.findall(rb"/Type\s*/Page\b", pdf))

@@ -182,7 +182,7 @@ void LoopChecking::measured_further() {
     for (const auto& row : found.rows) {
         level_.proof.row(fmt::format("{:g} Hz, {}", found.hz, row.name), row.unit, row.value,
                          row.low, row.high);
-        passed = passed && row.passed;
+        passed = passed && row.passed();
     }
     if (!passed) return;
     level_.excitation.measured(found.hz, found.transmission);

@@ -112,6 +112,96 @@ TEST_F(ArmingTest, OfARunningCampaignDoesNotExpire) {
     EXPECT_EQ(status().arming_left_s, 0);
 }
 
+/// A campaign that is paused at rest, armed by Ada.
+struct PausedTest : ArmingTest {
+    void begin() {
+        ASSERT_TRUE(order(Kind::arm).accepted);
+        ASSERT_TRUE(order(Kind::start).accepted);
+        ASSERT_TRUE(run_until(CampaignState::recording, 60));
+        ASSERT_TRUE(order(Kind::pause).accepted);
+        ASSERT_TRUE(run_until(CampaignState::paused, 200));
+    }
+};
+
+TEST_F(PausedTest, AResumeSaysWhoArmedAndWhen) {
+    begin();
+    pass(599);
+    EXPECT_EQ(order(Kind::resume, "Grace").message, "resumed, armed by Ada 10 min ago");
+    EXPECT_EQ(events.back(), "resumed by Grace, armed by Ada 10 min ago");
+    // AND a pause that was never entered is taken back as it was
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    ASSERT_TRUE(order(Kind::pause).accepted);
+    pass(3600);
+    EXPECT_TRUE(order(Kind::resume).accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 1000)) << status().reason;
+}
+
+TEST_F(PausedTest, ALongPauseEndsTheArmingAndTheCampaignKeepsItsPlace) {
+    begin();
+    EXPECT_EQ(order(Kind::arm, "Grace").message, "a campaign is running") << "it is armed";
+    pass(601);
+    // THEN nobody is armed, and whoever resumes has to be
+    EXPECT_EQ(events.back(), "the arming by Ada has expired: not resumed within 10 min");
+    EXPECT_EQ(campaign->armed_by(), "");
+    const auto refused = order(Kind::resume, "Bob");
+    EXPECT_FALSE(refused.accepted);
+    EXPECT_EQ(refused.message,
+              "paused for more than 10 min, which has ended the arming: a named person arms it "
+              "first");
+    run_for(5);
+    EXPECT_EQ(status().state, CampaignState::paused);
+    // WHEN it is armed THEN for what is left, and where it was
+    const auto armed = order(Kind::arm, "Bob");
+    EXPECT_TRUE(armed.accepted) << armed.message;
+    EXPECT_THAT(armed.message,
+                testing::AllOf(HasSubstr("about 6 min"), HasSubstr("to be resumed within 10 min")));
+    EXPECT_EQ(status().state, CampaignState::paused);
+    pass(599);
+    EXPECT_TRUE(order(Kind::resume, "Bob").accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 1000)) << status().reason;
+    EXPECT_EQ(orders.size(), 4U);
+    EXPECT_EQ(ends, 1);
+}
+
+TEST_F(PausedTest, AnArmingInAPauseExpiresAgain) {
+    begin();
+    pass(601);
+    ASSERT_TRUE(order(Kind::arm, "Bob").accepted);
+    pass(601);
+    EXPECT_EQ(events.back(), "the arming by Bob has expired: not resumed within 10 min");
+    EXPECT_FALSE(order(Kind::resume, "Bob").accepted);
+    EXPECT_EQ(status().state, CampaignState::paused);
+}
+
+TEST_F(PausedTest, AResumeIsRefusedWhereAStartWouldBe) {
+    begin();
+    shaker.now.fault = 1;
+    EXPECT_EQ(order(Kind::resume).message, "shaker fault 0x0001");
+    shaker.now.fault = 0;
+    accelerometers.table_g = 0.05;
+    run_for(1);
+    EXPECT_THAT(order(Kind::resume).message, testing::StartsWith("not at rest: table 0.03"));
+    accelerometers.table_g.reset();
+    run_for(1);
+    EXPECT_EQ(status().state, CampaignState::paused);
+    EXPECT_TRUE(order(Kind::resume).accepted);
+}
+
+TEST_F(PausedTest, AResumeIsRefusedWhereTheProofHasExpired) {
+    settings.proof = {};
+    settings.proof.keys = "a key";
+    remake();
+    SafetyProof proof(settings.proof);
+    proof.begin("Ada", 0.5);
+    proof.row("stop, table", "s", 1, 0, 3);
+    campaign->take_over_proofs({proof.conclude(0, "")});
+    begin();
+    utc_ns = 169 * 3600 * kSecond;
+    EXPECT_THAT(order(Kind::resume).message, HasSubstr("169.0 h old, valid for 168 h"));
+    utc_ns = 167 * 3600 * kSecond;
+    EXPECT_TRUE(order(Kind::resume).accepted);
+}
+
 TEST_F(ArmingTest, IsNamedWhenAnotherPersonStarts) {
     ASSERT_TRUE(order(Kind::arm).accepted);
     EXPECT_EQ(order(Kind::start, "Grace").message, "campaign started, armed by Ada");

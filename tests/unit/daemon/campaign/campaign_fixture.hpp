@@ -51,6 +51,9 @@ struct CampaignTest : testing::Test {
     bool slewed_while_moving = false;
     FakeAccelerometers accelerometers;
     bool disobeyed = false;
+    int uncommanded = 0, gimbals_led = 0, gimbals_silent = 0;
+    bool gimbal_status = true;      ///< it comes
+    bool starts_by_itself = false;  ///< the table, in this test
     Proving proving = Proving::nothing;
     std::int64_t utc_ns = 0;
     std::function<Time()> steady_clock;      ///< people's; none: the machine's
@@ -74,6 +77,12 @@ struct CampaignTest : testing::Test {
         void ramping(const rt::Ramp& ramp) override { test.ramps.push_back(ramp); }
         void proving(Proving what) override { test.proving = what; }
         void disobeyed(bool now_so) override { test.disobeyed = test.disobeyed || now_so; }
+        void uncommanded() override {
+            ++test.uncommanded;
+            EXPECT_TRUE(test.starts_by_itself) << testing::PrintToString(test.events);
+        }
+        void gimbals_led() override { ++test.gimbals_led; }
+        void gimbals_silent() override { ++test.gimbals_silent; }
     } rig_port{*this};
     struct TestDwells final : Dwells {
         explicit TestDwells(CampaignTest& t) : test(t) {}
@@ -152,7 +161,8 @@ struct CampaignTest : testing::Test {
     /// The rest of the rig for one step of 100 ms.
     void run_rig() {
         now += 100 * kMillisecond;
-        platform.time = platform.gimbal_time = now;
+        platform.time = now;
+        if (gimbal_status) platform.gimbal_time = now;
         for (; frames_seen < port.frames.size(); ++frames_seen) {
             const auto& frame = port.frames[frames_seen];
             platform.gimbal_command_echo = frame.data[7];

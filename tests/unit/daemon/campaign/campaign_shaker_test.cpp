@@ -1,4 +1,6 @@
 // What becomes of a stop.
+#include <numbers>
+
 #include "tests/unit/daemon/campaign/campaign_fixture.hpp"
 
 namespace vibrig::campaign {
@@ -53,6 +55,149 @@ TEST_F(CampaignTest, AStopThatWasNotObeyedIsAcknowledgedAtRestOnly) {
     EXPECT_THAT(events.back(), testing::StartsWith("stop confirmed: rest measured"));
     EXPECT_TRUE(command(Kind::acknowledge).accepted);
     EXPECT_TRUE(command(Kind::arm).accepted);
+}
+
+TEST_F(CampaignTest, IsNotAcknowledgedWhileAStopIsUnderWayAndTheTableMoves) {
+    // GIVEN a trip, and a contactor that is welded
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    accelerometers.table_g = 5;
+    campaign->on_trip("loop open", now);
+    run_for(0.7);
+    ASSERT_FALSE(disobeyed) << "it still has its time";
+    // WHEN somebody is quick THEN that is refused with what moves
+    EXPECT_THAT(
+        command(Kind::acknowledge).message,
+        testing::AllOf(testing::StartsWith("a stop is under way, rest is not measured yet: "),
+                       testing::HasSubstr("table 3."), testing::HasSubstr("platform 1.")));
+    // AND so it is where nobody can tell
+    accelerometers.silent = true;
+    run_for(0.5);
+    EXPECT_THAT(command(Kind::acknowledge).message,
+                testing::HasSubstr("no good accelerometer on the table"));
+    EXPECT_EQ(status().state, CampaignState::tripped);
+    accelerometers.silent = false;
+    accelerometers.table_g = 0;
+    run_for(1.5);
+    EXPECT_THAT(events, testing::Contains(testing::StartsWith("stop confirmed")));
+    EXPECT_TRUE(command(Kind::acknowledge).accepted);
+}
+
+/// Without an accelerometer on the table the platform's has to tell.
+TEST_F(CampaignTest, ATableThatStartsByItselfDuringASlewIsUncommanded) {
+    accelerometers.table_bound = false;
+    starts_by_itself = true;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::slewing, 60));
+    run_for(0.3);
+    accelerometers.table_g = 4.9;
+    const Time began = now;
+    for (int i = 0; i < 20 && uncommanded == 0; ++i) run_rig();
+    EXPECT_EQ(uncommanded, 1);
+    EXPECT_EQ(status().state, CampaignState::slewing);
+    EXPECT_LE(drivers::to_seconds(now - began), 1.5);
+    EXPECT_THAT(events.back(), testing::StartsWith("motion without a command: platform 1."));
+}
+
+TEST_F(CampaignTest, ATableThatStartsByItselfDuringAPauseIsUncommanded) {
+    accelerometers.table_bound = false;
+    starts_by_itself = true;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    ASSERT_TRUE(command(Kind::pause).accepted);
+    ASSERT_TRUE(run_until(CampaignState::paused, 60));
+    // GIVEN a hand on the platform
+    accelerometers.platform_g = 0.045 * std::numbers::sqrt2;
+    run_for(600);
+    EXPECT_EQ(uncommanded, 0);
+    // WHEN the table moves by a tenth of a g
+    accelerometers.platform_g.reset();
+    accelerometers.table_g = 0.15;
+    const Time began = now;
+    for (int i = 0; i < 20 && uncommanded == 0; ++i) run_rig();
+    EXPECT_EQ(uncommanded, 1);
+    EXPECT_LE(drivers::to_seconds(now - began), 1.5);
+}
+
+TEST_F(CampaignTest, NothingIsUncommandedInACampaignWithoutAWitnessOnTheTable) {
+    // GIVEN slews that shake the platform, as no gimbal does
+    accelerometers.table_bound = false;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    for (int i = 0; i < 4000 && status().state != CampaignState::finished; ++i) {
+        const bool slews = status().state == CampaignState::slewing && platform.slewing;
+        accelerometers.platform_g.reset();
+        if (slews) accelerometers.platform_g = 0.15 * std::numbers::sqrt2;
+        run_rig();
+    }
+    EXPECT_EQ(status().state, CampaignState::finished) << status().reason;
+    EXPECT_EQ(uncommanded, 0);
+}
+
+/// In a dwell at level.
+struct ShakingTest : CampaignTest {
+    void begin() {
+        ASSERT_TRUE(command(Kind::arm).accepted);
+        ASSERT_TRUE(command(Kind::start).accepted);
+        ASSERT_TRUE(run_until(CampaignState::recording, 60));
+        run_for(1);
+    }
+};
+
+TEST_F(ShakingTest, SomebodyElsesGimbalCommandIsATrip) {
+    begin();
+    // GIVEN one status that is out of order
+    const auto ours = platform.gimbal_command_echo;
+    platform.gimbal_command_echo = 77;
+    run_for(0.2);
+    platform.gimbal_command_echo = ours;
+    run_for(1);
+    EXPECT_EQ(gimbals_led, 0);
+    // WHEN the platform takes another's command
+    platform.gimbal_command_echo = 77;
+    platform.slewing = true;
+    const Time began = now;
+    for (int i = 0; i < 20 && gimbals_led == 0; ++i) run_rig();
+    EXPECT_EQ(gimbals_led, 1);
+    EXPECT_LE(drivers::to_seconds(now - began), 0.5);
+    EXPECT_THAT(events, testing::Contains(testing::AllOf(testing::HasSubstr("not left alone"),
+                                                         testing::HasSubstr("command 77"))));
+    EXPECT_TRUE(campaign->stopping());
+    run_for(5);
+    EXPECT_EQ(gimbals_led, 1) << "said once";
+}
+
+TEST_F(ShakingTest, APlatformThatSlewsByItselfIsATrip) {
+    begin();
+    platform.slewing = true;
+    run_for(0.6);
+    EXPECT_EQ(gimbals_led, 1);
+}
+
+TEST_F(ShakingTest, AGimbalStatusThatDoesNotComeIsStale) {
+    begin();
+    gimbal_status = false;
+    const Time began = now;
+    for (int i = 0; i < 20 && gimbals_silent == 0; ++i) run_rig();
+    EXPECT_EQ(gimbals_silent, 1);
+    EXPECT_NEAR(drivers::to_seconds(now - began), 0.5, 0.15);
+    EXPECT_THAT(events, testing::Contains(testing::StartsWith("no gimbal status for 0.")));
+}
+
+TEST_F(ShakingTest, AtRestTheGimbalsAreTheOperators) {
+    begin();
+    ASSERT_TRUE(command(Kind::pause).accepted);
+    ASSERT_TRUE(run_until(CampaignState::paused, 60));
+    platform.gimbal_command_echo = 77;
+    platform.slewing = true;
+    run_for(5);
+    platform.slewing = false;
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    EXPECT_EQ(gimbals_led + gimbals_silent, 0);
 }
 
 TEST_F(CampaignTest, APlannedRampDownThatDoesNotEndIsAStop) {

@@ -50,6 +50,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
         drivers::PlatformStatus platform() const override { return test.platform; }
         rt::Rest rest(Time at) const override { return test.accelerometers.monitor.rest(at); }
         void guard(rt::Guard level) override { test.guard = level; }
+        void uncommanded() override { ++test.uncommanded; }
     } rig_port{*this};
     struct StagedDwells final : Dwells {
         explicit StagedDwells(StagesTest& t) : test(t) {}
@@ -71,6 +72,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
     std::vector<std::string> events;
     std::size_t reported = 0;
     rt::Guard guard = rt::Guard::idle;
+    int uncommanded = 0;
     FakeAccelerometers accelerometers;
     Time now = kSecond;
 
@@ -344,6 +346,24 @@ TEST_F(StagesTest, LevelsBeforeTheZeroingAndThenTurnsTheAzimuthOnly) {
     ASSERT_TRUE(run_until(CampaignState::aborted, 400));
     EXPECT_THAT(status().reason, HasSubstr("levelling: cannot settle"));
     EXPECT_THAT(status().reason, HasSubstr("zeroing"));
+}
+
+TEST_F(StagesTest, ATableThatStartsByItselfWhileItLevelsOrTakesZerosIsUncommanded) {
+    // GIVEN a rig without an accelerometer on the table
+    accelerometers.table_bound = false;
+    for (const auto stage : {CampaignState::levelling, CampaignState::zeroing}) {
+        settings.levelling = stage == CampaignState::levelling;
+        settings.zeroing = !settings.levelling;
+        begin();
+        ASSERT_TRUE(run_until(stage, 60));
+        for (int i = 0; i < 80; ++i) tick();
+        ASSERT_EQ(uncommanded, 0);
+        accelerometers.table_g = 4.9;
+        for (int i = 0; i < 60; ++i) tick();
+        EXPECT_EQ(uncommanded, 1) << "within 1.5 s of " << testing::PrintToString(events);
+        accelerometers.table_g.reset();
+        uncommanded = 0;
+    }
 }
 
 TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {

@@ -181,11 +181,17 @@ TEST_F(CampaignTest, OneAcknowledgementIsForTheTripAndForWhatTheControllerLatche
     EXPECT_EQ(status().state, CampaignState::tripped) << "what was refused has changed nothing";
     // WHEN the chain is closed and the table at rest THEN once is enough
     shaker.now.measured_g = 0;
+    EXPECT_THAT(command(Kind::acknowledge).message,
+                testing::StartsWith("a stop is under way, rest is not measured yet"))
+        << "whatever the controller says";
+    shaker_obeys = false;  // it has, and its fault stays
+    run_for(1);
     const auto stops = shaker.stops_asked.load();
     EXPECT_EQ(command(Kind::acknowledge).message,
               "acknowledged: emergency-stop chain open; shaker fault 0x0002");
     EXPECT_EQ(shaker.stops_asked, stops + 1);
     EXPECT_EQ(command(Kind::arm).message, "a stop of the shaker is pending");
+    shaker_obeys = true;
     run_rig();
     shaker.now.fault = 0;
     EXPECT_THAT(command(Kind::arm).message, testing::StartsWith("stopping: rest is not measured"));
@@ -407,8 +413,10 @@ TEST_F(CampaignTest, GoesOnAfterARestartWhereItWasAndOnlyOnCommand) {
     run_for(30);
     EXPECT_TRUE(shaker.requests.empty());
     EXPECT_TRUE(port.frames.empty());
-    // WHEN armed, THEN still nothing moves
-    ASSERT_TRUE(command(Kind::arm).accepted);
+    // WHEN armed, THEN it says how long either way takes, and still nothing moves
+    const auto armed = command(Kind::arm);
+    ASSERT_TRUE(armed.accepted);
+    EXPECT_THAT(armed.message, testing::HasSubstr(", resumed about "));
     run_for(30);
     EXPECT_TRUE(shaker.requests.empty());
     // WHEN the rig is not as it was, THEN it is refused

@@ -1,6 +1,11 @@
 #include "daemon/campaign/stop_monitor.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
 #include "tests/unit/daemon/interlock/fake_shaker.hpp"
@@ -20,6 +25,7 @@ struct StopMonitorTest : testing::Test {
     StopMonitor monitor{shaker, [this](Time at) { return accelerometers.monitor.rest(at); }, {}};
     Time now = 10 * kSecond;
     bool obeys = true;
+    bool handled = false;  ///< gimbals move
 
     StopMonitorTest() {
         shaker.now.valid = true;
@@ -38,7 +44,7 @@ struct StopMonitorTest : testing::Test {
             if (obeys) shaker.obey(now);
             shaker.now.time = now;
             accelerometers.run_to(now, shaker.now.measured_g);
-            const auto found = monitor.update(now);
+            const auto found = monitor.update(now, handled);
             if (news != nullptr && found != News::none) {
                 *news = found;
                 break;
@@ -125,6 +131,58 @@ TEST_F(StopMonitorTest, AHandOnThePlatformIsNotUncommandedWhereTheTableIsSeenSti
     accelerometers.table_good = false;
     run(5, &news);
     EXPECT_EQ(news, News::uncommanded);
+}
+
+TEST_F(StopMonitorTest, WhileGimbalsMoveThePlatformStillTellsOfATableThatShakes) {
+    // GIVEN a rig without an accelerometer on the table, and a slew of a minute
+    accelerometers.table_bound = false;
+    handled = true;
+    run(1);
+    // WHEN the table below it begins by itself
+    accelerometers.table_g = 4.9;
+    auto news = News::none;
+    const double took_s = run(40, &news);
+    EXPECT_EQ(news, News::uncommanded);
+    EXPECT_LE(took_s, safety::kUnarmedMotion_s + 0.5);
+    EXPECT_THAT(monitor.what_moves(now), testing::HasSubstr("platform 1."));
+}
+
+TEST_F(StopMonitorTest, WhatASlewMakesOfThePlatformIsNoTable) {
+    // GIVEN a rig without an accelerometer on the table
+    accelerometers.table_bound = false;
+    handled = true;
+    accelerometers.platform_g = 0.19 * std::numbers::sqrt2;
+    auto news = News::none;
+    run(60, &news);
+    EXPECT_EQ(news, News::none);
+    // BUT where no gimbal moves it is motion
+    handled = false;
+    run(5, &news);
+    EXPECT_EQ(news, News::uncommanded);
+}
+
+/// More than any rig's slews do, by far: 30 deg/s, an axis that counts double, 0.1 m from the axis.
+TEST(SlewsWithoutAWitnessOnTheTable, StayBelowWhatIsTakenForATable) {
+    FakeShaker shaker;
+    shaker.now.valid = true;
+    rt::RestMonitor rest({}, 25 * kMillisecond);
+    StopMonitor monitor(shaker, [&](Time at) { return rest.rest(at); }, {});
+    const double rate = 30 * std::numbers::pi / 180, centripetal_g = rate * rate * 0.1 / 9.81;
+    double highest_g = 0;
+    for (int k = 1; k < 40 * 24; ++k) {
+        drivers::Sample sample;
+        sample.time = k * 25 * kMillisecond;
+        const double angle = rate * drivers::to_seconds(sample.time);
+        sample.force = {2 * std::sin(angle) + 0.05, std::cos(angle) + centripetal_g, 0.05};
+        sample.quality.fill(drivers::Quality::good);
+        sample.quality[static_cast<std::size_t>(drivers::Channel::table_accel)] =
+            drivers::Quality::unbound;
+        rest.add(sample);
+        highest_g = std::max(highest_g, rest.rest(sample.time).platform.rms_g);
+        EXPECT_EQ(monitor.update(sample.time, true), News::none) << angle;
+    }
+    EXPECT_GT(highest_g, safety::kMoving_g) << "or this shows nothing";
+    EXPECT_LT(highest_g, 0.1);
 }
 
 TEST_F(StopMonitorTest, APlatformHasTheTimeOfItsPadsBeforeItDisobeys) {

@@ -110,12 +110,16 @@ TEST_F(Commissioned, RandomRigsAreNamedRightOrNotAtAll) {
             continue;
         }
         ++decided;
-        double drawing = 0, sense = 0;
+        double drawing = 0, sense = 0, all = 0;
         for (const auto& witness : state["result"]["witnesses"]) {
+            all += witness["ln_odds"].get<double>();
             if (witness["name"] == "drawing") drawing = witness["ln_odds"];
             if (witness["name"] == "sense") sense = witness["ln_odds"];
         }
         EXPECT_GE(drawing * sense, 0) << "true witnesses";
+        // Whichever parity the fit began with.
+        EXPECT_GT(all, 0);
+        EXPECT_GE(sense, 0) << "for what was decided";
         senses += sense != 0 ? 1 : 0;
         expect_right(*rig, state["result"]);
         for (std::size_t i = 0; i < 3; ++i) EXPECT_LE(most_travel[i], 175 + 1e-9);

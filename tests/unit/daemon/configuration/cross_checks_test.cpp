@@ -58,6 +58,34 @@ TEST(Together, ReadBacksThatComeTooSeldomToSeeAnEmergencyStopAreRefused) {
     EXPECT_EQ(complaint("shaker.poll_period_ms = 60000\n", false), "");
 }
 
+TEST(Together, ALinkThatTriesAgainTooLateForAStopIsRefused) {
+    EXPECT_EQ(complaint("shaker.backoff_min_ms = 1000\n", true), "");
+    EXPECT_THAT(complaint("shaker.backoff_min_ms = 1001\n", true),
+                StartsWith("rig.toml:1:25: shaker.backoff_min_ms: found 1001 ms, expected 1000 ms "
+                           "at most"));
+    EXPECT_EQ(complaint("shaker.backoff_min_ms = 5000\n", false), "");
+}
+
+TEST(Together, AWindowOfRestThatLeavesNoTimeToStopIsRefused) {
+    const auto found = [](const std::string& window, const std::string& deadline) {
+        return complaint(
+            "shaker.rest_window_s = " + window + "\nshaker.stop_deadline_s = " + deadline + "\n",
+            true);
+    };
+    EXPECT_EQ(found("2", "3"), "");
+    EXPECT_EQ(found("0.5", "1"), "") << "the shortest deadline there is";
+    EXPECT_EQ(found("10", "30"), "");
+    EXPECT_THAT(found("5", "3"),
+                AllOf(StartsWith("rig.toml:1:24: shaker.rest_window_s: found a window of rest of 5 "
+                                 "s with stop_deadline_s 3, expected 2 s at most"),
+                      testing::Not(HasSubstr("\n"))));
+    EXPECT_THAT(found("0.6", "1"), HasSubstr("expected 0.5 s at most"));
+    // 8 samples at least
+    EXPECT_THAT(complaint("can.sample_rate_hz = 2\ncan.stale_deadline_ms = 2000\n", true),
+                StartsWith("rig.toml:1:22: can.sample_rate_hz: found a window of rest of 4 s"));
+    EXPECT_EQ(complaint("shaker.rest_window_s = 5\n", false), "");
+}
+
 TEST(Together, AHornWithoutItsDeviceIsRefused) {
     EXPECT_THAT(complaint("annunciator.modbus = { port = 502, horn_coil = 3 }\n", true),
                 AllOf(StartsWith("rig.toml:1:31: annunciator.modbus.port: found it without"),

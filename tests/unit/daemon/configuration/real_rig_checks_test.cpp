@@ -12,6 +12,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 const std::string kMap = R"(
 [shaker.registers]
@@ -133,6 +134,30 @@ TEST(RealRig, ARangeBelowWhatTheCampaignMakesIsRefused) {
                 HasSubstr("accelerometer.range_g: found 7 g, expected 7.0003 g at least"));
     EXPECT_EQ(real_complaint("accelerometer.range_g = 7.01\n" + kMap), "");
     EXPECT_EQ(real_complaint("accelerometer.range_g = 0\n" + kMap), "") << "not known";
+}
+
+TEST(RealRig, WhatIsSeenAfterAMinuteIsRefused) {
+    const std::string rtu = "shaker.transport = \"rtu\"\nshaker.device = \"/dev/ttyUSB0\"\n";
+    const std::string stale = "can.stale_deadline_ms = ", status = "gimbal.status_deadline_ms = ",
+                      answer = "shaker.response_timeout_ms = ";
+    EXPECT_EQ(real_complaint(stale + "1000\n" + status + "1000\n" + answer + "1000\n" + kMap), "");
+    EXPECT_EQ(real_complaint(rtu + answer + "500\n" + kMap), "");
+    EXPECT_THAT(real_complaint(stale + "60000\n" + kMap),
+                StartsWith("rig.toml:1:25: can.stale_deadline_ms: found 60000 ms, expected 1000 ms "
+                           "at most"));
+    EXPECT_THAT(real_complaint(status + "1001\n" + kMap),
+                StartsWith("rig.toml:1:29: gimbal.status_deadline_ms: found 1001 ms, expected 1000 "
+                           "ms at most"));
+    EXPECT_THAT(real_complaint(answer + "1001\n" + kMap),
+                StartsWith("rig.toml:1:30: shaker.response_timeout_ms: found 1001 ms, expected "
+                           "1000 ms at most"));
+    EXPECT_THAT(real_complaint(rtu + answer + "501\n" + kMap),
+                HasSubstr("expected 500 ms at most"));
+    // BUT a program may be late, a recording is read as it is, and a slow bus has two periods
+    EXPECT_EQ(complaint(stale + "10000\n" + status + "10000\n" + answer + "5000\n", true), "");
+    EXPECT_EQ(complaint(stale + "60000\n", false), "");
+    EXPECT_THAT(real_complaint("can.sample_rate_hz = 1\n" + stale + "2000\n" + kMap),
+                Not(HasSubstr("stale_deadline_ms")));
 }
 
 TEST(Positions, AreGimbalAnglesAndConvertedByEncoderSignAndZero) {
