@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 namespace vibrig::estimator::allan {
 
 enum class Reading : unsigned char {
@@ -9,6 +11,8 @@ enum class Reading : unsigned char {
     mean_step    ///< the mean of adjacent windows differs
 };
 [[nodiscard]] const char* words_of(Reading reading);
+/// Of an octave: the lower, middle or upper third of so many.
+[[nodiscard]] Reading reading_of(std::size_t octave, std::size_t octaves);
 
 struct Alarm {
     Reading reading = Reading::middle_tau;

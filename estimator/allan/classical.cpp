@@ -1,11 +1,11 @@
 #include "estimator/allan/classical.hpp"
 
 #include <cmath>
-#include <complex>
 #include <limits>
-#include <sstream>
 
+#include "estimator/allan/series.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -31,42 +31,19 @@ void check_class(const char* name, const Polynomial& a, double ClassSums::*membe
         }
     }
     if (last > 0) {
-        std::ostringstream note;
-        note.precision(3);
-        note << "the " << name << " class is negative for tau from " << first << " to " << last
-             << " s: no sum of damped oscillations has this variance there";
-        notes.push_back(note.str());
+        notes.push_back(
+            text("the %s class is negative for tau from %.3g to %.3g s: no sum of damped "
+                 "oscillations has this variance there",
+                 name, first, last));
     }
 }
 
 }  // namespace
 
-double classical_variance(std::span<const Oscillation> oscillations, double q, double tau) {
-    double sum = 2 * q * q / (tau * tau);
-    for (const Oscillation& o : oscillations) {
-        const std::complex<double> p(1 / o.tm, o.om);
-        const std::complex<double> z = p * tau;
-        // z - 1 + exp(-z) loses all digits for small z: series z^2/2 - z^3/6 + z^4/24 - ...
-        std::complex<double> f = z - 1.0 + std::exp(-z);
-        if (std::abs(z) < 1e-2) {
-            f = z * z * (0.5 - z * (1.0 / 6 - z * (1.0 / 24 - z * (1.0 / 120 - z / 720.0))));
-        }
-        sum += 2 * o.s * o.s * std::real(f / (z * z));
-    }
-    return sum;
-}
-
 double allan_multiplier(int power) { return 2 * (1 - std::pow(2.0, power)); }
 
 ClassSums class_sums(const Polynomial& a, double tau) {
     return {a[0] + tau * (a[1] + tau * a[2]), (a[3] + a[4] / tau) / tau};
-}
-
-Polynomial limits_of(const Oscillation& o) {
-    const double s2 = o.s * o.s;
-    const double u = o.om * o.om * o.tm * o.tm;
-    return {s2, -s2 / (3 * o.tm), s2 * (1 / (o.tm * o.tm) - o.om * o.om) / 12,
-            2 * s2 * o.tm / (1 + u), -2 * s2 * o.tm * o.tm * (1 - u) / ((1 + u) * (1 + u))};
 }
 
 ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, MeanMode mode) {

@@ -9,17 +9,6 @@
 
 namespace vibrig::estimator::allan {
 
-/// Autocorrelation s^2 exp(-|t| / tm) cos(om t): Gauss-Markov for om = 0.
-struct Oscillation {
-    double s = 0;   ///< deg/h
-    double tm = 1;  ///< s
-    double om = 0;  ///< rad/s
-};
-
-/// Variance of the tau-average about the true mean, exact, with quantisation Q (arcsec).
-[[nodiscard]] double classical_variance(std::span<const Oscillation> oscillations, double q,
-                                        double tau);
-
 /// sigma_c^2 = a0 + a1 tau + a2 tau^2 + a3 / tau + a4 / tau^2: slow class a0 a1 a2, fast a3 a4.
 using Polynomial = std::array<double, 5>;
 inline constexpr std::array<int, 5> kPowers{0, 1, 2, -1, -2};
@@ -31,8 +20,6 @@ struct ClassSums {
     double fast = 0;  ///< a3 / tau + a4 / tau^2
 };
 [[nodiscard]] ClassSums class_sums(const Polynomial& a, double tau);
-/// Limits of one oscillation for tau much shorter (a0 a1 a2) and much longer (a3 a4) than tm.
-[[nodiscard]] Polynomial limits_of(const Oscillation& oscillation);
 
 /// What is known of the mean. With the mean of the window removed each tau^n becomes tau^n - T^n,
 /// so a0 cancels and cannot be known.

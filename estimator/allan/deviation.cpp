@@ -117,31 +117,18 @@ double divisor(Statistic statistic, double tau) {
     return (third ? 6 : 2) * tau * tau;
 }
 
-struct Entry {
-    Statistic statistic;
-    const char* name;
-};
-constexpr std::array<Entry, 7> kNames{{{Statistic::adev, "adev"},
-                                       {Statistic::oadev, "oadev"},
-                                       {Statistic::mdev, "mdev"},
-                                       {Statistic::hdev, "hdev"},
-                                       {Statistic::ohdev, "ohdev"},
-                                       {Statistic::tdev, "tdev"},
-                                       {Statistic::totdev, "totdev"}}};
+constexpr std::array<const char*, 7> kNames{"adev",  "oadev", "mdev",  "hdev",
+                                            "ohdev", "tdev",  "totdev"};  ///< by Statistic
 
 }  // namespace
 
-const char* name_of(Statistic statistic) {
-    return kNames[static_cast<std::size_t>(statistic)].name;
-}
+const char* name_of(Statistic statistic) { return kNames[static_cast<std::size_t>(statistic)]; }
 
 Statistic statistic_named(const std::string& name) {
     std::string all;
-    for (const Entry& entry : kNames) {
-        if (name == entry.name) {
-            return entry.statistic;
-        }
-        all += std::string(all.empty() ? "" : ", ") + entry.name;
+    for (std::size_t i = 0; i < kNames.size(); ++i) {
+        if (name == kNames[i]) return static_cast<Statistic>(i);
+        all += std::string(all.empty() ? "" : ", ") + kNames[i];
     }
     throw DataError("type: \"" + name + "\" found, expected one of " + all);
 }

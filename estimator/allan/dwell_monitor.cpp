@@ -278,12 +278,8 @@ std::vector<Alarm> DwellMonitor::check(const DwellAngles& dwell) const {
         const double ratio = (octave.differences * centred(dwell)).squaredNorm() / expected;
         const auto [low, high] = bounds(dwell, i, level);
         if (ratio >= low && ratio <= high) continue;
-        const std::size_t part = 3 * i / count;
-        alarms.push_back({part == 0   ? Reading::short_tau
-                          : part == 1 ? Reading::middle_tau
-                                      : Reading::long_tau,
-                          static_cast<double>(octave.m) * dwell.block_s, ratio,
-                          ratio < low ? low : high, 0});
+        alarms.push_back({reading_of(i, count), static_cast<double>(octave.m) * dwell.block_s,
+                          ratio, ratio < low ? low : high, 0});
     }
     return alarms;
 }

@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t kShortestWindow = 9;
 constexpr std::size_t kGrid = 20;
-constexpr std::size_t kDecimation = 16;
 constexpr double kMostMissing = 0.1;
 
 std::size_t checked_window(std::size_t window) {
@@ -58,51 +57,38 @@ std::vector<std::size_t> window_factors(std::size_t window) {
 
 DynamicAllan::DynamicAllan(const DynamicSettings& settings)
     : settings_(settings),
-      near_(settings.tau0, checked_window(settings.window), window_factors(settings.window)),
-      covariance_(near_.factors(), settings.window + 1, settings.tau0),
-      hop_(checked_hop(settings)) {
-    if (settings.long_records) {
-        far_.emplace(settings.tau0 * kDecimation, settings.window, window_factors(settings.window));
-    }
-}
+      sliding_(settings.tau0, checked_window(settings.window), window_factors(settings.window)),
+      covariance_(sliding_.factors(), settings.window + 1, settings.tau0),
+      hop_(checked_hop(settings)) {}
 
 bool DynamicAllan::add(double rate) noexcept {
-    near_.add(rate);
-    if (far_) {
-        // A block with a missing sample is missing.
-        block_ += rate / static_cast<double>(kDecimation);
-        if (++in_block_ == kDecimation) {
-            far_->add(block_);
-            block_ = 0;
-            in_block_ = 0;
-        }
-    }
-    return near_.full() && (near_.samples() - settings_.window) % hop_ == 0;
+    sliding_.add(rate);
+    return sliding_.full() && (sliding_.samples() - settings_.window) % hop_ == 0;
 }
 
 WindowRow DynamicAllan::row() const {
     WindowRow row;
     const double tau0 = settings_.tau0;
-    const std::vector<std::size_t>& factors = near_.factors();
-    row.begin_s = static_cast<double>(near_.samples() - settings_.window) * tau0;
+    const std::vector<std::size_t>& factors = sliding_.factors();
+    row.begin_s = static_cast<double>(sliding_.samples() - settings_.window) * tau0;
     row.centre_s = row.begin_s + 0.5 * static_cast<double>(settings_.window) * tau0;
-    row.mean = near_.mean();
-    row.missing = near_.missing();
+    row.mean = sliding_.mean();
+    row.missing = sliding_.missing();
     const double centre = settings_.mode == MeanMode::known_mean ? settings_.known_mean : row.mean;
     std::vector<ClassicalPoint> classical;
     for (std::size_t k = 0; k < factors.size(); ++k) {
-        row.allan.push_back(near_.allan(k, settings_.shape));
-        row.share.push_back(near_.share(k) * share_of(settings_.shape));
+        row.allan.push_back(sliding_.allan(k, settings_.shape));
+        row.share.push_back(sliding_.share(k) * share_of(settings_.shape));
         const double tau = static_cast<double>(factors[k]) * tau0;
         if (settings_.mode == MeanMode::corrected) {
-            const SlidingVariance::Tiled tiled = near_.tiled(k);
+            const SlidingVariance::Tiled tiled = sliding_.tiled(k);
             row.classical.push_back(tiled.variance);
             if (tiled.variance > 0) {
                 classical.push_back(
                     {tau, tiled.variance, static_cast<double>(tiled.covered) * tau0});
             }
         } else {
-            row.classical.push_back(near_.classical(k, centre));
+            row.classical.push_back(sliding_.classical(k, centre));
             if (row.classical[k] > 0) {
                 classical.push_back({tau, row.classical[k], 0});
             }
@@ -118,23 +104,6 @@ WindowRow DynamicAllan::row() const {
     }
     return row;
 }
-
-std::vector<VariancePoint> DynamicAllan::beyond() const {
-    std::vector<VariancePoint> points;
-    if (!far_ || !far_->full()) {
-        return points;
-    }
-    for (std::size_t k = 0; k < far_->factors().size(); ++k) {
-        const std::size_t m = far_->factors()[k] * kDecimation;
-        if (m > factors().back() && far_->allan(k) > 0) {
-            points.push_back(
-                {static_cast<double>(m) * settings_.tau0, m, far_->allan(k), far_->share(k)});
-        }
-    }
-    return points;
-}
-
-std::uint64_t DynamicAllan::faults() const { return near_.faults() + (far_ ? far_->faults() : 0); }
 
 DynamicSummary summarise(const DynamicAllan& dynamic, const std::vector<WindowRow>& rows) {
     DynamicSummary summary;

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "estimator/allan/classical.hpp"
@@ -20,7 +17,6 @@ struct DynamicSettings {
     std::array<bool, kTerms> wanted = kAllTerms;
     WindowShape shape = WindowShape::rectangular;  ///< of the Allan variance
     bool fits = true;                              ///< of Q to R to each window's curve
-    bool long_records = false;  ///< a second ring, decimated by 16, for tau beyond the window
 };
 
 /// One window of the surface, by the factors of the grid.
@@ -56,22 +52,17 @@ class DynamicAllan {
     /// Row of the window that ends with the newest sample. Fits, and so allocates.
     [[nodiscard]] WindowRow row() const;
 
-    [[nodiscard]] const std::vector<std::size_t>& factors() const { return near_.factors(); }
+    [[nodiscard]] const std::vector<std::size_t>& factors() const { return sliding_.factors(); }
     [[nodiscard]] const DynamicSettings& settings() const { return settings_; }
-    /// Factors (of tau0) and variances beyond the window; empty before sixteen windows have passed.
-    [[nodiscard]] std::vector<VariancePoint> beyond() const;
-    [[nodiscard]] std::uint64_t faults() const;
+    [[nodiscard]] std::uint64_t faults() const { return sliding_.faults(); }
     /// Covariance of the Allan variances of one window.
     [[nodiscard]] const CurveCovariance& covariance() const { return covariance_; }
 
   private:
     DynamicSettings settings_;
-    SlidingVariance near_;
+    SlidingVariance sliding_;
     CurveCovariance covariance_;
-    std::optional<SlidingVariance> far_;
     std::uint64_t hop_;
-    double block_ = 0;
-    std::size_t in_block_ = 0;
 };
 
 /// 20 log-spaced factors up to a third of the window, and the octaves up to a quarter.

@@ -199,12 +199,18 @@ std::optional<Exponent> exponent_at(const Series& series, std::size_t m) {
         return {};
     }
     constexpr int kMostDifferences = 2;
+    double before = 0;
     for (int order = 0;; ++order) {
         const double r = lag_one(parts, order > 0);
         const double delta = r / (1 + r);
+        double alpha = 2 - 2 * (delta + order);
+        // Of one noise both differences say the same. Where two cross, what the second one leaves
+        // of the phase's looks like white phase, whose interval would be far too narrow.
+        if (order == kMostDifferences) alpha = std::min(alpha, before);
         if (order == kMostDifferences || delta < 0.25) {
-            return Exponent{2 - 2 * (delta + order), real(count)};
+            return Exponent{alpha, real(count)};
         }
+        before = alpha;
         for (std::vector<double>& z : parts) {
             std::adjacent_difference(z.begin(), z.end(), z.begin());
             z.erase(z.begin());

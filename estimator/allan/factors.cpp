@@ -1,7 +1,8 @@
 #include <cmath>
-#include <sstream>
+#include <numeric>
 
 #include "estimator/allan/deviation.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -27,9 +28,7 @@ std::vector<std::size_t> decade_factors(std::size_t largest) {
 
 std::vector<std::size_t> all_factors(std::size_t largest) {
     std::vector<std::size_t> factors(largest);
-    for (std::size_t i = 0; i < largest; ++i) {
-        factors[i] = i + 1;
-    }
+    std::iota(factors.begin(), factors.end(), std::size_t{1});
     return factors;
 }
 
@@ -52,18 +51,13 @@ std::vector<std::size_t> factors_of(std::span<const double> taus, double tau0,
     for (const double tau : taus) {
         const double ratio = tau / tau0;
         const double m = std::round(ratio);
-        std::ostringstream message;
-        if (!(ratio > 0) || std::abs(ratio - m) > 1e-6 * m) {
-            message << "taus: " << tau << " s found, expected a multiple of tau0 = " << tau0
-                    << " s";
-        } else if (m > static_cast<double>(largest)) {
-            message << "taus: " << tau << " s found, the record allows at most "
-                    << static_cast<double>(largest) * tau0 << " s";
-        } else {
-            factors.push_back(static_cast<std::size_t>(m));
-            continue;
-        }
-        throw DataError(message.str());
+        if (!(ratio > 0) || std::abs(ratio - m) > 1e-6 * m)
+            throw DataError(
+                text("taus: %g s found, expected a multiple of tau0 = %g s", tau, tau0));
+        if (m > static_cast<double>(largest))
+            throw DataError(text("taus: %g s found, the record allows at most %g s", tau,
+                                 static_cast<double>(largest) * tau0));
+        factors.push_back(static_cast<std::size_t>(m));
     }
     return factors;
 }

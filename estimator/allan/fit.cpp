@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "estimator/allan/series.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -206,15 +206,13 @@ void note_ramp(Fit& fit, double record_h) {
     if (!k.detected) return;
     r.below = std::max(r.below, bound);
     if (!r.detected || r.value < 2 * bound) {
-        std::ostringstream note;
-        note.precision(3);
-        note << "R is known no better than K/sqrt(T) = " << bound << " deg/h^2 in this record of "
-             << record_h << " h";
+        fit.ramp_note =
+            text("R is known no better than K/sqrt(T) = %.3g deg/h^2 in this record of %.3g h",
+                 bound, record_h);
         if (r.value > 0) {
-            note << "; a record of " << 4 * walk * walk / (r.value * r.value)
-                 << " h would show it at two standard errors";
+            fit.ramp_note += text("; a record of %.3g h would show it at two standard errors",
+                                  4 * walk * walk / (r.value * r.value));
         }
-        fit.ramp_note = note.str();
     }
 }
 
@@ -231,12 +229,9 @@ Terms Fit::values() const {
 std::string Fit::verdict() const {
     if (!slow.found) return "no noise slower than white is detected";
     if (slow.determined) return {};
-    std::ostringstream text;
-    text.precision(3);
-    text << "slow noise";
-    if (slow.tau > 0) text << " of " << slow.ratio << " times white at " << slow.tau << " s";
-    text << "; kind not determined";
-    return text.str();
+    return "slow noise" +
+           (slow.tau > 0 ? text(" of %.3g times white at %.3g s", slow.ratio, slow.tau) : "") +
+           "; kind not determined";
 }
 
 Fit fit_noise(std::span<const VariancePoint> curve, const CurveCovariance& covariance,

@@ -92,10 +92,6 @@ CurveLikelihood::Evaluated CurveLikelihood::evaluate(const Terms& squares, bool 
     return out;
 }
 
-double CurveLikelihood::deviance(const Terms& squares) const {
-    return evaluate(squares, false).deviance;
-}
-
 double CurveLikelihood::largest_square(std::size_t term) const {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < points_.size(); ++i) {

@@ -45,7 +45,6 @@ class CurveLikelihood {
 
     [[nodiscard]] std::size_t points() const { return points_.size(); }
     [[nodiscard]] const std::vector<VariancePoint>& curve() const { return points_; }
-    [[nodiscard]] double deviance(const Terms& squares) const;
     /// Nothing when a term of the set goes to zero: a smaller set says the same.
     [[nodiscard]] std::optional<TermFit> best(const TermSet& set) const;
     /// With square `value` of term `at` the least deviance over the other terms of `from`, which

@@ -1,6 +1,7 @@
 #include "estimator/allan/monitor.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "estimator/allan/deviation.hpp"
@@ -8,17 +9,17 @@
 namespace vibrig::estimator::allan {
 
 const char* words_of(Reading reading) {
-    switch (reading) {
-        case Reading::short_tau:
-            return "short averaging times: quantisation or vibration leakage";
-        case Reading::middle_tau:
-            return "middle averaging times: angle random walk N";
-        case Reading::long_tau:
-            return "long averaging times: temperature, rate random walk K or ramp R";
-        case Reading::mean_step:
-            return "step of the mean between adjacent windows";
-    }
-    return "";
+    static constexpr std::array kWords{
+        "short averaging times: quantisation or vibration leakage",
+        "middle averaging times: angle random walk N",
+        "long averaging times: temperature, rate random walk K or ramp R",
+        "step of the mean between adjacent windows"};
+    return kWords[static_cast<std::size_t>(reading)];
+}
+
+Reading reading_of(std::size_t octave, std::size_t octaves) {
+    const std::size_t part = 3 * octave / octaves;
+    return part == 0 ? Reading::short_tau : part == 1 ? Reading::middle_tau : Reading::long_tau;
 }
 
 StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
@@ -139,8 +140,8 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
             continue;
         }
         octave.since = octave.since.value_or(row.begin_s);
-        alarms.push_back({reading_of(i), static_cast<double>(octave.m) * tau0_, ratio,
-                          ratio < octave.low ? octave.low : octave.high, *octave.since});
+        alarms.push_back({reading_of(i, octaves_.size()), static_cast<double>(octave.m) * tau0_,
+                          ratio, ratio < octave.low ? octave.low : octave.high, *octave.since});
     }
     const double step = means_.size() > back_ && mean_sigma_ > 0
                             ? (means_.back() - means_.front()) / mean_sigma_
@@ -154,11 +155,6 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
     alarms.push_back({Reading::mean_step, static_cast<double>(window_) * tau0_, step,
                       std::copysign(limit, step), *step_since_});
     return alarms;
-}
-
-Reading StationarityMonitor::reading_of(std::size_t octave) const {
-    const std::size_t part = 3 * octave / octaves_.size();
-    return part == 0 ? Reading::short_tau : part == 1 ? Reading::middle_tau : Reading::long_tau;
 }
 
 double StationarityMonitor::smallest_change() const {

@@ -47,7 +47,6 @@ class StationarityMonitor {
     void learn(const WindowRow& row);
     void set_bounds(const Terms& terms, double reference_windows);
     [[nodiscard]] double share_of_alpha() const;
-    [[nodiscard]] Reading reading_of(std::size_t octave) const;
 
     MonitorSettings settings_;
     CurveCovariance covariance_;

@@ -3,8 +3,6 @@
 #include <array>
 #include <cstddef>
 
-#include "estimator/allan/edf.hpp"
-
 namespace vibrig::estimator::allan {
 
 inline constexpr std::size_t kTerms = 5;

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <sstream>
+
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -97,14 +98,6 @@ Series Series::from_phase(std::span<const double> phase, double tau0) {
     return series;
 }
 
-const Segment& Series::longest() const {
-    static const Segment none;
-    const auto at =
-        std::max_element(segments.begin(), segments.end(),
-                         [](const auto& a, const auto& b) { return a.points() < b.points(); });
-    return at == segments.end() ? none : *at;
-}
-
 Inspection inspect(std::span<const double> values) {
     Inspection found;
     double low = std::numeric_limits<double>::infinity();
@@ -153,22 +146,21 @@ std::vector<std::size_t> outliers(std::span<const double> values) {
 }
 
 void require_usable(const Series& series, const Inspection& inspection, double first_value) {
-    std::ostringstream message;
     const std::size_t present = series.samples - series.missing;
-    if (present < kFewestSamples) {
-        message << "too few samples: " << present << " present, at least " << kFewestSamples
-                << " needed";
-    } else if (static_cast<double>(series.missing) >
-               kLargestMissingShare * static_cast<double>(series.samples)) {
-        message << "too many missing samples: " << series.missing << " of " << series.samples
-                << " (longest gap " << series.longest_gap << "), at most a tenth may be missing";
-    } else if (inspection.constant) {
-        message << "variance is zero: all " << present << " samples are " << first_value
-                << "; the sensor is stuck or its resolution is coarser than its noise";
-    } else {
-        return;
-    }
-    throw DataError(message.str());
+    if (present < kFewestSamples)
+        throw DataError(
+            text("too few samples: %zu present, at least %zu needed", present, kFewestSamples));
+    if (static_cast<double>(series.missing) >
+        kLargestMissingShare * static_cast<double>(series.samples))
+        throw DataError(
+            text("too many missing samples: %zu of %zu (longest gap %zu), at most a "
+                 "tenth may be missing",
+                 series.missing, series.samples, series.longest_gap));
+    if (inspection.constant)
+        throw DataError(
+            text("variance is zero: all %zu samples are %g; the sensor is stuck or "
+                 "its resolution is coarser than its noise",
+                 present, first_value));
 }
 
 }  // namespace vibrig::estimator::allan

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <span>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 namespace vibrig::estimator::allan {
@@ -36,7 +35,6 @@ struct Series {
     [[nodiscard]] static Series from_phase(std::span<const double> phase, double tau0);
 
     [[nodiscard]] std::size_t rates() const { return phase.empty() ? 0 : phase.size() - 1; }
-    [[nodiscard]] const Segment& longest() const;
 };
 
 /// What is odd in a record but does not stop the analysis.

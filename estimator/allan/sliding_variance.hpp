@@ -25,10 +25,8 @@ class SlidingVariance {
 
     [[nodiscard]] bool full() const noexcept { return newest_ >= window_; }
     [[nodiscard]] std::uint64_t samples() const noexcept { return newest_; }
-    [[nodiscard]] std::size_t window() const noexcept { return window_; }
     [[nodiscard]] std::size_t missing() const noexcept { return missing_; }
     [[nodiscard]] const std::vector<std::size_t>& factors() const noexcept { return factors_; }
-    [[nodiscard]] double tau0() const noexcept { return tau0_; }
 
     [[nodiscard]] double mean() const noexcept;
     /// Rate unit squared, 0 without terms.

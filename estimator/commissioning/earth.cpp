@@ -8,10 +8,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -101,11 +101,10 @@ Description other_parity(const Description& d) {
 }
 
 std::string of_all(const std::vector<Witness>& witnesses) {
-    std::string text;
+    std::string all;
     for (const Witness& witness : witnesses)
-        text +=
-            words("%s%s %+.1f", text.empty() ? "" : ", ", witness.name.c_str(), witness.ln_odds);
-    return text.empty() ? "nobody says anything" : text;
+        all += text("%s%s %+.1f", all.empty() ? "" : ", ", witness.name.c_str(), witness.ln_odds);
+    return all.empty() ? "nobody says anything" : all;
 }
 
 /// A latitude and a clock that the horizontal rate does not allow; empty: it does.
@@ -118,7 +117,7 @@ std::string contradiction(const EarthRate& rate, const Statements& said) {
     const double off = std::abs(rate.latitude_deg() - std::abs(*said.latitude_deg));
     const double allowed = 1 + 3 * rate.latitude_sigma_deg();
     if (off <= allowed) return {};
-    return words(
+    return text(
         "site.latitude_deg: %.2f stated, %.2f measured (either hemisphere), %.2f apart "
         "at most",
         *said.latitude_deg, rate.latitude_deg(), allowed);
@@ -149,7 +148,6 @@ EarthRate earth_rate(const Description& description, const std::vector<FreeDrift
     const Kinematics kinematics{Settings{}};
     Normal normal = Normal::Zero();
     Unknown right = Unknown::Zero();
-    double all = 0;
     const double weight = 1 / (settings.rate_sigma * settings.rate_sigma);
     for (const FreeDrift& drift : drifts) {
         const auto h = rows_at(description, drift.reading, kinematics);
@@ -158,7 +156,6 @@ EarthRate earth_rate(const Description& description, const std::vector<FreeDrift
             throw std::invalid_argument("commissioning: a reading or a slope is not finite");
         normal += weight * h.transpose() * h;
         right += weight * h.transpose() * rate;
-        all += weight * rate.squaredNorm();
     }
     normal.topLeftCorner<3, 3>().diagonal().array() += 1e-12;
     for (int i = 3; i < kUnknown; ++i) {
@@ -168,8 +165,7 @@ EarthRate earth_rate(const Description& description, const std::vector<FreeDrift
     const linear_algebra::PivotedCholesky solver(normal);
     const Unknown x = solver.solve(right);
     const Normal covariance = solver.solve(Normal::Identity());
-    return {x.head<3>(), covariance.diagonal().head<3>().cwiseSqrt(),
-            std::max(0.0, all - right.dot(x))};
+    return {x.head<3>(), covariance.diagonal().head<3>().cwiseSqrt()};
 }
 
 Eigen::Vector3d platform_rate(const Description& d, const FreeDrift& drift, const EarthRate& rate) {
@@ -191,9 +187,9 @@ std::string time_unit_doubt(double horizontal, double latitude_deg) {
          {1e-3, "time in ms?"}}};
     for (const auto& [factor, question] : kFactors)
         if (std::abs(ratio / factor - 1) < 0.1)
-            return words("the horizontal Earth rate is %.4g times too large: %s", ratio, question);
-    return words("the horizontal Earth rate is %.4g deg/h, %.4g expected at this latitude",
-                 horizontal, expected);
+            return text("the horizontal Earth rate is %.4g times too large: %s", ratio, question);
+    return text("the horizontal Earth rate is %.4g deg/h, %.4g expected at this latitude",
+                horizontal, expected);
 }
 
 EarthFinding find_by_earth(const Description& description, const std::vector<FreeDrift>& drifts,
@@ -206,8 +202,8 @@ EarthFinding find_by_earth(const Description& description, const std::vector<Fre
     double sum = 0;
     for (const Witness& witness : finding.witnesses) sum += witness.ln_odds;
     if (std::abs(sum) < kAsked) {
-        finding.why = words("accelerometers inverted or not: %s; a sum of %g is asked, %.1f found",
-                            of_all(finding.witnesses).c_str(), kAsked, std::abs(sum));
+        finding.why = text("accelerometers inverted or not: %s; a sum of %g is asked, %.1f found",
+                           of_all(finding.witnesses).c_str(), kAsked, std::abs(sum));
         return finding;
     }
     for (const Witness& witness : finding.witnesses)

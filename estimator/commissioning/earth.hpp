@@ -24,7 +24,6 @@ struct EarthSettings {
 struct EarthRate {
     Eigen::Vector3d neu = Eigen::Vector3d::Zero();  ///< north, east, up
     Eigen::Vector3d sigma = Eigen::Vector3d::Zero();
-    double chi2 = 0;  ///< of the residual, priors included
     /// Azimuth of the rig's north axis, from true north towards east.
     [[nodiscard]] double azimuth_deg() const;
     /// Without its sign, from the horizontal part; 0 where that is more than the Earth's.

@@ -6,9 +6,9 @@
 #include <stdexcept>
 
 #include "estimator/commissioning/gravity_fit.hpp"
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -65,8 +65,8 @@ std::string dead_channel(const std::vector<Stop>& stops, double limit_g) {
         if (spread(stops, i) >= limit_g) continue;
         double mean = 0;
         for (const Stop& stop : stops) mean += stop.force[i] / static_cast<double>(stops.size());
-        return words("accelerometer.%s shows %.4f g +- %.4f whatever the attitude",
-                     kAccelerometers[i], mean, spread(stops, i) / 2);
+        return text("accelerometer.%s shows %.4f g +- %.4f whatever the attitude",
+                    kAccelerometers[i], mean, spread(stops, i) / 2);
     }
     return {};
 }
@@ -80,21 +80,21 @@ std::string out_of_bounds(const Description& d, const GravitySettings& s) {
     off.diagonal().setZero();
     const double skew_deg = off.cwiseAbs().maxCoeff() * kDegPerRad;
     const double zero = d.zero_g.cwiseAbs().maxCoeff();
-    if (gain > s.gain) return words("gain %.3f off 1, %g at most", gain, s.gain);
+    if (gain > s.gain) return text("gain %.3f off 1, %g at most", gain, s.gain);
     if (skew_deg > s.misalignment_deg)
-        return words("accelerometers %.2f deg off the axes, %g at most", skew_deg,
-                     s.misalignment_deg);
-    if (zero > s.zero_g) return words("zero %.4f g, %g at most", zero, s.zero_g);
+        return text("accelerometers %.2f deg off the axes, %g at most", skew_deg,
+                    s.misalignment_deg);
+    if (zero > s.zero_g) return text("zero %.4f g, %g at most", zero, s.zero_g);
     if (std::abs(d.elevation_deg) > s.elevation_deg)
-        return words("the outer axis is %.2f deg off level, %g at most: shim the base",
-                     d.elevation_deg, s.elevation_deg);
+        return text("the outer axis is %.2f deg off level, %g at most: shim the base",
+                    d.elevation_deg, s.elevation_deg);
     return {};
 }
 
 std::string named(const Hypothesis& h) {
     const auto& c = h.best.channel;
-    return words("channels %d %d %d are outer, inner, azimuth, product of the signs %d", c[0] + 1,
-                 c[1] + 1, c[2] + 1, h.sign_product());
+    return text("channels %d %d %d are outer, inner, azimuth, product of the signs %d", c[0] + 1,
+                c[1] + 1, c[2] + 1, h.sign_product());
 }
 
 void decide(GravityFinding& finding, const GravitySettings& s) {
@@ -106,7 +106,7 @@ void decide(GravityFinding& finding, const GravitySettings& s) {
     const Hypothesis& best = finding.hypotheses.front();
     if (!(best.rms_g <= s.rms_with_second_g)) {
         finding.verdict = Verdict::refused;
-        finding.why = words(
+        finding.why = text(
             "no description fits: the best leaves %.1f mg, %.1f at most: gimbals in another order, "
             "not square, or accelerometers askew, two on one axis or in another unit",
             1e3 * best.rms_g, 1e3 * s.rms_with_second_g);
@@ -120,14 +120,14 @@ void decide(GravityFinding& finding, const GravitySettings& s) {
     if (finding.hypotheses.size() > 1 && -finding.hypotheses[1].ln_ratio < s.ln_ratio) {
         finding.why =
             "not separated: " + named(best) + "; or " + named(finding.hypotheses[1]) +
-            words(" (ln ratio %.1f, %g asked)", -finding.hypotheses[1].ln_ratio, s.ln_ratio);
+            text(" (ln ratio %.1f, %g asked)", -finding.hypotheses[1].ln_ratio, s.ln_ratio);
         return;
     }
     finding.verdict = Verdict::decided;
     if (best.rms_g > s.rms_g) {
         finding.second_person = true;
-        finding.why = words("%.1f mg left: gimbals not square, or an encoder eccentric: 12'",
-                            1e3 * best.rms_g);
+        finding.why = text("%.1f mg left: gimbals not square, or an encoder eccentric: 12'",
+                           1e3 * best.rms_g);
     }
 }
 
@@ -139,7 +139,7 @@ GravityFinding find_by_gravity(const std::vector<Stop>& stops, const GravitySett
     // First: of a gimbal that is stuck an accelerometer may see nothing, and is not dead.
     for (std::size_t channel = 0; channel < 3; ++channel) {
         if (!stands_still(stops, channel)) continue;
-        finding.why = words("angle channel %zu does not move: its gimbal is stuck", channel + 1);
+        finding.why = text("angle channel %zu does not move: its gimbal is stuck", channel + 1);
         return finding;
     }
     if (auto dead = dead_channel(stops, settings.dead_g); !dead.empty()) {
@@ -151,8 +151,8 @@ GravityFinding find_by_gravity(const std::vector<Stop>& stops, const GravitySett
         const auto sweep = sweep_of(stops, channel);
         if (std::max({spread(sweep, 0), spread(sweep, 1), spread(sweep, 2)}) < settings.dead_g) {
             finding.verdict = Verdict::refused;
-            finding.why = words(
-                "gravity does not respond to angle channel %zu: its axis is upright", channel + 1);
+            finding.why = text("gravity does not respond to angle channel %zu: its axis is upright",
+                               channel + 1);
             return finding;
         }
         const auto scores = unit_scores(sweep, channel);

@@ -8,10 +8,10 @@
 
 #include "estimator/commissioning/dwell_fit.hpp"
 #include "estimator/commissioning/suspect_search.hpp"
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/settings_check.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -78,29 +78,29 @@ RestFit fit_rest(const Settings& settings, const std::vector<DwellMean>& stops, 
 void hold_earth_against(const OpeningLimits& limits, Opening& o) {
     if (!(o.sigma_deg_h <= limits.known_deg_h))
         o.refused.push_back(
-            words("free drift tells north and east to %.2g deg/h only: the readings are not those "
-                  "of the positions",
-                  o.sigma_deg_h));
+            text("free drift tells north and east to %.2g deg/h only: the readings are not those "
+                 "of the positions",
+                 o.sigma_deg_h));
     const double off = std::max(std::abs(o.north_deg_h), std::abs(o.east_deg_h));
     const double warned = std::max(limits.warn_deg_h, 5 * o.sigma_deg_h);
     const double refused = std::max(limits.refused_deg_h, 5 * o.sigma_deg_h);
     if (!(off <= warned)) {
-        const auto text = words(
+        const auto found = text(
             "Earth rate %.2f deg/h north, %.2f deg/h east off what the site's keys give (warned "
             "above %.2f, refused above %.2f)",
             o.north_deg_h, o.east_deg_h, warned, refused);
-        (off <= refused ? o.warned : o.refused).push_back(text);
+        (off <= refused ? o.warned : o.refused).push_back(found);
     }
     if (!(o.rest_chi2 <= limits.rest_chi2))
-        o.refused.push_back(words("free drift fits no Earth rate: chi2 %.3g, %g allowed",
-                                  o.rest_chi2, limits.rest_chi2));
+        o.refused.push_back(text("free drift fits no Earth rate: chi2 %.3g, %g allowed",
+                                 o.rest_chi2, limits.rest_chi2));
     const double vertical = std::abs(o.vertical_deg_h);
     if (!(vertical <= limits.warn_vertical_deg_h))
         (vertical <= limits.refused_vertical_deg_h ? o.warned : o.refused)
-            .push_back(words("drift about the vertical %.1f deg/h (warned above %g, refused above "
-                             "%g): sign of site.latitude_deg?",
-                             o.vertical_deg_h, limits.warn_vertical_deg_h,
-                             limits.refused_vertical_deg_h));
+            .push_back(text("drift about the vertical %.1f deg/h (warned above %g, refused above "
+                            "%g): sign of site.latitude_deg?",
+                            o.vertical_deg_h, limits.warn_vertical_deg_h,
+                            limits.refused_vertical_deg_h));
 }
 
 }  // namespace
@@ -113,9 +113,9 @@ Opening hold_at_rest(const Settings& settings, const std::vector<DwellMean>& sto
         o.gravity_deg = std::max(o.gravity_deg, v.apart_deg());
     if (!(o.gravity_deg <= limits.warn_deg))
         (o.gravity_deg <= limits.refused_deg ? o.warned : o.refused)
-            .push_back(words("mean force %.2f deg off the vertical by the encoders (warned above "
-                             "%g, refused above %g)",
-                             o.gravity_deg, limits.warn_deg, limits.refused_deg));
+            .push_back(text("mean force %.2f deg off the vertical by the encoders (warned above "
+                            "%g, refused above %g)",
+                            o.gravity_deg, limits.warn_deg, limits.refused_deg));
     const RestFit fit = fit_rest(settings, stops, limits.rate_sigma, kAnyEarth, kAnyDrift, 1);
     if (fit.drifts < 3) return o;
     o.earth_known = true;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <string>
 #include <vector>
 
 // What is known of a rig whose configuration is not: readings and forces at rest, rates of free

@@ -8,8 +8,8 @@
 #include "estimator/commissioning/dwell_fit.hpp"
 #include "estimator/commissioning/rig.hpp"
 #include "estimator/commissioning/suspect_search.hpp"
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -74,8 +74,8 @@ class Search {
         for (std::size_t i = 0; i < 3; ++i) {
             Settings s = as_is_;
             s.encoder_sign[i] = -s.encoder_sign[i];
-            consider(s, words("platform.encoder_sign: %d instead of %d of the %s gimbal",
-                              s.encoder_sign[i], as_is_.encoder_sign[i], kGimbalNames[i]));
+            consider(s, text("platform.encoder_sign: %d instead of %d of the %s gimbal",
+                             s.encoder_sign[i], as_is_.encoder_sign[i], kGimbalNames[i]));
             const auto with = [&](double off) {
                 Settings z = as_is_;
                 z.encoder_zero_deg[i] += off;
@@ -83,8 +83,8 @@ class Search {
             };
             const Settings best = with(best_of(with, 5, 36));
             consider(best,
-                     words("platform.encoder_zero_deg: %.2f instead of %g of the %s gimbal",
-                           best.encoder_zero_deg[i], as_is_.encoder_zero_deg[i], kGimbalNames[i]));
+                     text("platform.encoder_zero_deg: %.2f instead of %g of the %s gimbal",
+                          best.encoder_zero_deg[i], as_is_.encoder_zero_deg[i], kGimbalNames[i]));
         }
     }
 
@@ -109,8 +109,8 @@ class Search {
             for (int i = 0; i < 3; ++i) {
                 int from = 0;
                 order.row(i).cwiseAbs().maxCoeff(&from);
-                what += words("%s %c%c", i == 0 ? "" : ",", order(i, from) > 0 ? '+' : '-',
-                              "xyz"[from]);
+                what +=
+                    text("%s %c%c", i == 0 ? "" : ",", order(i, from) > 0 ? '+' : '-', "xyz"[from]);
             }
             consider(s, std::move(what));
         }
@@ -123,8 +123,8 @@ class Search {
                 s.up = {axis, sign};
                 if (axis == as_is_.up.axis && sign == as_is_.up.sign) continue;
                 consider(
-                    s, words("platform.up: %c%c instead of %c%c", sign > 0 ? '+' : '-', "xyz"[axis],
-                             as_is_.up.sign > 0 ? '+' : '-', "xyz"[as_is_.up.axis]));
+                    s, text("platform.up: %c%c instead of %c%c", sign > 0 ? '+' : '-', "xyz"[axis],
+                            as_is_.up.sign > 0 ? '+' : '-', "xyz"[as_is_.up.axis]));
             }
         }
     }
@@ -136,8 +136,8 @@ class Search {
             return s;
         };
         const Settings s = with(best_of(with, 0.5, 8));
-        consider(s, words("site.elevation_deg: %.2f instead of %g", s.elevation_deg + 0.0,
-                          as_is_.elevation_deg));
+        consider(s, text("site.elevation_deg: %.2f instead of %g", s.elevation_deg + 0.0,
+                         as_is_.elevation_deg));
     }
 
     void site() {
@@ -145,7 +145,7 @@ class Search {
         Settings s = as_is_;
         s.latitude_deg = -s.latitude_deg;
         consider(s,
-                 words("site.latitude_deg: %g instead of %g", s.latitude_deg, as_is_.latitude_deg));
+                 text("site.latitude_deg: %g instead of %g", s.latitude_deg, as_is_.latitude_deg));
         const auto latitude = [&](double off) {
             Settings l = as_is_;
             // Its sign was another suspect.
@@ -156,15 +156,15 @@ class Search {
         };
         s = latitude(best_of(latitude, 5, 36));
         consider(
-            s, words("site.latitude_deg: %.2f instead of %g", s.latitude_deg, as_is_.latitude_deg));
+            s, text("site.latitude_deg: %.2f instead of %g", s.latitude_deg, as_is_.latitude_deg));
         const auto azimuth = [&](double off) {
             Settings a = as_is_;
             a.azimuth_deg += off;
             return a;
         };
         s = azimuth(best_of(azimuth, 5, 36));
-        consider(s, words("site.azimuth_deg: %.2f instead of %g",
-                          std::remainder(s.azimuth_deg, 360.0), as_is_.azimuth_deg));
+        consider(s, text("site.azimuth_deg: %.2f instead of %g",
+                         std::remainder(s.azimuth_deg, 360.0), as_is_.azimuth_deg));
     }
 
     void time() {
@@ -183,7 +183,7 @@ class Search {
                 dwell.duration_s *= factor;
             }
             if (!judge_.fits(as_is_, scaled)) continue;
-            found_.push_back({words("time_s: it is in %s", name),
+            found_.push_back({text("time_s: it is in %s", name),
                               gravity(as_is_) + rates(as_is_, factor), as_is_, factor});
         }
     }

@@ -3,10 +3,10 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -40,9 +40,8 @@ Expected expected(const Suspect& of, const std::array<double, 3>& reading_rad) {
 }  // namespace
 
 std::string ToldApart::words() const {
-    return vibrig::estimator::commissioning::words(
-        "told apart at (%g, %g, %g) deg, by %.3g %s", position_deg[0], position_deg[1],
-        position_deg[2], by_deg_h > 0 ? by_deg_h : by_mg, by_deg_h > 0 ? "deg/h" : "mg");
+    return text("told apart at (%g, %g, %g) deg, by %.3g %s", position_deg[0], position_deg[1],
+                position_deg[2], by_deg_h > 0 ? by_deg_h : by_mg, by_deg_h > 0 ? "deg/h" : "mg");
 }
 
 std::optional<ToldApart> told_apart(const Settings& settings, const Suspect& a, const Suspect& b) {

@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -61,19 +61,19 @@ std::string doubt_of(std::size_t k, const Vector3d& up, const Vector3d& down, do
                      double sigma, const TorqueSettings& settings) {
     const double one = up.norm(), other = down.norm(), least = 5 * sigma;
     if (std::max(one, other) < std::max(least, settings.warn_scale))
-        return words("torque command %c turns nothing: %.2f +- %.2f deg/h for %.0f commanded",
-                     kCommand[k], std::max(one, other) * command, sigma * command, command);
+        return text("torque command %c turns nothing: %.2f +- %.2f deg/h for %.0f commanded",
+                    kCommand[k], std::max(one, other) * command, sigma * command, command);
     const auto within = [&settings](double scale) {
         return scale >= 1 / settings.factor && scale <= settings.factor;
     };
     if (!within(one) || !within(other))
-        return words(
+        return text(
             "torque command %c: %.2f of the rate commanded one way, %.2f the other, %.2f to %.2f "
             "expected",
             kCommand[k], one, other, 1 / settings.factor, settings.factor);
     if (up.dot(down) < 0.5 * one * other)
-        return words("torque command %c turns the platform the same way whatever its sign",
-                     kCommand[k]);
+        return text("torque command %c turns the platform the same way whatever its sign",
+                    kCommand[k]);
     return {};
 }
 
@@ -85,9 +85,9 @@ std::string name_axes(TorqueFinding& f) {
         const auto at = static_cast<std::size_t>(k);
         if (const auto* const other = std::find(f.axis.begin(), f.axis.begin() + k, largest);
             other != f.axis.begin() + k)
-            return words("torque commands %c and %c both turn platform axis %c",
-                         kCommand[static_cast<std::size_t>(other - f.axis.begin())], kCommand[at],
-                         kAxis[static_cast<std::size_t>(largest)]);
+            return text("torque commands %c and %c both turn platform axis %c",
+                        kCommand[static_cast<std::size_t>(other - f.axis.begin())], kCommand[at],
+                        kAxis[static_cast<std::size_t>(largest)]);
         f.axis[at] = largest;
         f.sign[at] = f.response(largest, k) > 0 ? 1 : -1;
         f.scale[at] = f.response.col(k).norm();
@@ -102,7 +102,7 @@ std::string turn_axes(TorqueFinding& f, const TorqueSettings& settings) {
         axes.col(f.axis[k]) = f.sign[k] / f.scale[k] * f.response.col(static_cast<int>(k));
     const double turn = std::atan2(axes(1, 0) - axes(0, 1), axes(0, 0) + axes(1, 1));
     if (std::abs(turn) * kDegPerRad > settings.turn_deg)
-        return words(
+        return text(
             "the torquers' axes are turned by %.1f deg about z against the accelerometers, "
             "%g at most",
             turn * kDegPerRad, settings.turn_deg);
@@ -112,9 +112,8 @@ std::string turn_axes(TorqueFinding& f, const TorqueSettings& settings) {
         const int a = f.axis[k];
         const double off = std::acos(std::clamp(left(a, a), -1.0, 1.0)) * kDegPerRad;
         if (off > settings.skew_deg)
-            return words(
-                "torque command %c turns the platform %.1f deg off its axis %c, %g at most",
-                kCommand[k], off, kAxis[static_cast<std::size_t>(a)], settings.skew_deg);
+            return text("torque command %c turns the platform %.1f deg off its axis %c, %g at most",
+                        kCommand[k], off, kAxis[static_cast<std::size_t>(a)], settings.skew_deg);
     }
     f.turn_arcmin = turn * kDegPerRad * 60;
     f.response = about_z.transpose() * f.response;
@@ -150,14 +149,14 @@ TorqueFinding find_by_torque(const Description& description, const EarthRate& ra
     for (std::size_t k = 0; k < 3; ++k)
         if (std::abs(f.scale[k] - 1) > settings.warn_scale)
             f.warnings.push_back(
-                words("torque command %c: the platform turns by %.3f of what is "
-                      "commanded",
-                      kCommand[k], f.scale[k]));
+                text("torque command %c: the platform turns by %.3f of what is "
+                     "commanded",
+                     kCommand[k], f.scale[k]));
     if (std::abs(f.turn_arcmin) > settings.warn_turn_arcmin)
         f.warnings.push_back(
-            words("gyros against accelerometers: %.0f' about z; the azimuth zero is "
-                  "the torquers'",
-                  f.turn_arcmin));
+            text("gyros against accelerometers: %.0f' about z; the azimuth zero is "
+                 "the torquers'",
+                 f.turn_arcmin));
     return f;
 }
 

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "estimator/commissioning/words.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -55,7 +55,7 @@ TurnFinding find_by_turns(const Description& d, const std::vector<CountedTurn>& 
         f.sign[g] = row[axis] < 0 ? -1 : 1;
         f.scale[g] = row.norm();
         if (!(std::abs(f.scale[g] - 1) <= kScale)) {
-            f.why = words(
+            f.why = text(
                 "gyro increments %c count %.3f of what the platform turns, 1 expected: "
                 "frames are lost, or its factor in the DBC is wrong",
                 "XYZ"[g], f.scale[g]);
@@ -63,13 +63,13 @@ TurnFinding find_by_turns(const Description& d, const std::vector<CountedTurn>& 
         }
         const double skew = kDegPerRad * std::acos(std::min(1.0, std::abs(row[axis]) / row.norm()));
         if (!(skew <= kSkew_deg)) {
-            f.why = words("gyro increments %c count about an axis %.1f deg off platform %c",
-                          "XYZ"[g], skew, "xyz"[axis]);
+            f.why = text("gyro increments %c count about an axis %.1f deg off platform %c",
+                         "XYZ"[g], skew, "xyz"[axis]);
             return f;
         }
         if (std::find(f.axis.begin(), f.axis.begin() + gyro, axis) != f.axis.begin() + gyro) {
-            f.why = words("gyro increments %c count about platform %c, as another gyro's do",
-                          "XYZ"[g], "xyz"[axis]);
+            f.why = text("gyro increments %c count about platform %c, as another gyro's do",
+                         "XYZ"[g], "xyz"[axis]);
             return f;
         }
     }

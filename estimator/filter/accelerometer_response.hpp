@@ -8,6 +8,14 @@
 
 namespace vibrig::estimator {
 
+/// At `hz` between two points, straight on logarithmic scales.
+[[nodiscard]] inline double log_straight(const std::pair<double, double>& below,
+                                         const std::pair<double, double>& above,
+                                         double hz) noexcept {
+    const double part = std::log(hz / below.first) / std::log(above.first / below.first);
+    return below.second * std::pow(above.second / below.second, part);
+}
+
 /// How accelerometers see what vibrates, over frequency (docs/theory/spectrum.md).
 struct AccelerometerResponse {
     double bandwidth_hz = 0;  ///< where they see half of the power; 0: no limit
@@ -39,9 +47,7 @@ struct AccelerometerResponse {
                                         [hz](const auto& point) { return point.first >= hz; });
         if (above == table.end()) return 0;
         if (above == table.begin() || above->first == hz) return above->second;
-        const auto& below = *(above - 1);
-        const double part = std::log(hz / below.first) / std::log(above->first / below.first);
-        return below.second * std::pow(above->second / below.second, part);
+        return log_straight(*(above - 1), *above, hz);
     }
 };
 

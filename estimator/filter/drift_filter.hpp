@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
@@ -47,7 +46,6 @@ class DriftFilter {
     [[nodiscard]] Eigen::Vector3d angles() const noexcept;
     /// North, up and east at the last time step, platform axes: the level that spikes do not move.
     [[nodiscard]] const Eigen::Matrix3d& level() const noexcept { return level_; }
-    [[nodiscard]] bool started() const noexcept { return started_; }
 
   private:
     void predict(double dt, const VibrationMoment& vibration) noexcept;

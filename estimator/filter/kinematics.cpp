@@ -40,7 +40,6 @@ Eigen::Vector3d earth_rate_reference(const Eigen::Matrix3d& level, double latitu
 
 Kinematics::Kinematics(const Settings& settings)
     : level_(level_reference(settings.up, settings.elevation_deg * kRadPerDeg)),
-      up_(level_.col(1)),
       earth_rate_(estimator::earth_rate_reference(level_, settings.latitude_deg * kRadPerDeg,
                                                   settings.azimuth_deg * kRadPerDeg)),
       encoder_sign_(settings.encoder_sign[0], settings.encoder_sign[1], settings.encoder_sign[2]),

@@ -52,14 +52,13 @@ class Kinematics {
 
     /// level_reference() of its settings.
     [[nodiscard]] const Eigen::Matrix3d& level() const noexcept { return level_; }
-    [[nodiscard]] const Eigen::Vector3d& up_reference() const noexcept { return up_; }
     [[nodiscard]] const Eigen::Vector3d& earth_rate_reference() const noexcept {
         return earth_rate_;
     }
 
   private:
     Eigen::Matrix3d level_;
-    Eigen::Vector3d up_, earth_rate_, encoder_sign_, encoder_zero_;
+    Eigen::Vector3d earth_rate_, encoder_sign_, encoder_zero_;
 };
 
 }  // namespace vibrig::estimator

@@ -4,7 +4,6 @@
 
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/product.hpp"
-#include "estimator/filter/settings.hpp"
 #include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {

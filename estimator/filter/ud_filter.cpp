@@ -44,23 +44,6 @@ void UdFilter::let_first_move(double variance) noexcept {
     }
 }
 
-UdFilter::Matrix3 UdFilter::angle_covariance() const noexcept {
-    Matrix3 p{};
-    for (std::size_t i = 0; i < kAngles; ++i) {
-        for (std::size_t j = 0; j < kAngles; ++j) {
-            for (std::size_t c = 0; c < kAngles; ++c) {
-                p[i][j] +=
-                    memory_.angle_block[c][i] * memory_.angle_block[c][j] * memory_.d_angle[c];
-            }
-            for (std::size_t c = 0; c < kConstants; ++c) {
-                p[i][j] +=
-                    memory_.angle_row[i][c] * memory_.angle_row[j][c] * memory_.d_constant[c];
-            }
-        }
-    }
-    return p;
-}
-
 void UdFilter::sigma(std::array<double, kConstants>& out) const noexcept {
     out = {};
     for (std::size_t c = 0; c < kConstants; ++c) {

@@ -17,7 +17,6 @@ class UdFilter {
     static constexpr std::size_t kStates = kAngles + kConstants;
 
     using Vector3 = std::array<double, 3>;
-    using Matrix3 = std::array<std::array<double, 3>, 3>;
     using Transition = UdTransition;
 
     /// Constants at zero with these standard deviations (0: fixed), angles at zero, variance zero.
@@ -48,7 +47,6 @@ class UdFilter {
         return {memory_.x_angle[0], memory_.x_angle[1], memory_.x_angle[2]};
     }
     [[nodiscard]] const double* constants() const noexcept { return memory_.x_constant; }
-    [[nodiscard]] Matrix3 angle_covariance() const noexcept;
     /// sqrt of the diagonal of the constants' covariance.
     void sigma(std::array<double, kConstants>& out) const noexcept;
     /// Row-major 30 x 30 covariance of the constants.

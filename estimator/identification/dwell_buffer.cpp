@@ -16,19 +16,20 @@ double median(std::vector<double>& values) noexcept {
 
 }  // namespace
 
-DwellBuffer::DwellBuffer(double span_s, std::size_t capacity)
-    : span_s_(span_s), capacity_(capacity) {
-    readings_.reserve(capacity);
-    scratch_.reserve(capacity);
+DwellBuffer::DwellBuffer(double span_s, double longest_s, double rate_hz)
+    : span_s_(span_s), rate_hz_(rate_hz) {
+    readings_.reserve(static_cast<std::size_t>(longest_s * rate_hz) + 1);
+    scratch_.reserve(readings_.capacity());
 }
 
 void DwellBuffer::clear() noexcept {
     readings_.clear();
     shortest_interval_ = 0;
+    wanted_s_ = span_s_;
 }
 
 void DwellBuffer::push(const Reading& reading) noexcept {
-    if (readings_.size() == capacity_) return;
+    if (readings_.size() == readings_.capacity()) return;
     if (!readings_.empty()) {
         const double interval = reading.time_s - last().time_s;
         shortest_interval_ =
@@ -38,10 +39,10 @@ void DwellBuffer::push(const Reading& reading) noexcept {
 }
 
 bool DwellBuffer::full() const noexcept {
-    if (readings_.size() == capacity_) return true;
+    if (static_cast<double>(readings_.size()) > wanted_s_ * rate_hz_) return true;
     if (readings_.size() < 2) return false;
     const double span = last().time_s - readings_.front().time_s + shortest_interval_;
-    return span >= span_s_ - 1e-6;
+    return span >= wanted_s_ - 1e-6;
 }
 
 double DwellBuffer::period(double otherwise) noexcept {

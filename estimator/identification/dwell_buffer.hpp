@@ -20,9 +20,14 @@ struct Reading {
 /// them. Never allocates after construction.
 class DwellBuffer {
   public:
-    DwellBuffer(double span_s, std::size_t capacity);
+    /// Covers `span_s`, or `longest_s` at most where it is told to wait; of samples at `rate_hz` or
+    /// less.
+    DwellBuffer(double span_s, double longest_s, double rate_hz);
 
     void clear() noexcept;
+    /// Until so much is covered.
+    void wait_for(double span_s) noexcept { wanted_s_ = span_s; }
+    [[nodiscard]] double waits_for() const noexcept { return wanted_s_; }
     void push(const Reading& reading) noexcept;
     /// The span is covered, or there is no more room.
     [[nodiscard]] bool full() const noexcept;
@@ -37,8 +42,8 @@ class DwellBuffer {
     [[nodiscard]] bool median_angles(Eigen::Vector3d& out) noexcept;
 
   private:
-    double span_s_;
-    std::size_t capacity_;
+    double span_s_, rate_hz_;
+    double wanted_s_ = span_s_;
     double shortest_interval_ = 0;
     std::vector<Reading> readings_;
     std::vector<double> scratch_;

@@ -10,7 +10,10 @@ namespace {
 
 constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
 constexpr double kRejectedTolerance = 0.01;  ///< of the samples
-constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
+/// Of the samples: of angles as noisy as configured 2e-5 are beyond the gate, of angles twice as
+/// noisy 10 %. Beyond that what the gate lets pass agrees with any prediction.
+constexpr double kMostGated = 0.12;
+constexpr double kLevelTolerance = 0.1;  ///< change of kappa within a dwell
 /// The same, followed but reported: above what an amplitude held within 0.3 % does, below one that
 /// drifts by 2 %. With more readings missing than this share the level itself is not so sure.
 constexpr double kLevelDrift = 0.025;
@@ -52,9 +55,13 @@ void DwellRecord::count(const StepResult& step) noexcept {
             break;
         case StepOutcome::reinitialised:
             ++reinitialised;
+            ++gated;
             ++rejected;
             break;
         case StepOutcome::gated:
+            ++gated;
+            ++rejected;
+            break;
         case StepOutcome::bad_angles:
         case StepOutcome::bad_time:
             ++rejected;
@@ -205,9 +212,6 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag(misfit, true);
     } else if (!random && !(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
         flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
-    } else if (!random && r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
-        // The level lags behind by its window: second-order terms would take up the difference.
-        flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
     } else if (aliases && VibrationLevel::excluded(nominal_hz, r.period_s, window_s)) {
         flag(
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
@@ -216,11 +220,19 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     } else if (aliases && VibrationLevel::excluded(frequency_hz, r.period_s, window_s)) {
         flag("the vibration is too close to a multiple of half the sample rate: dwell rejected",
              true);
+    } else if (!random && r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
+        // The level lags behind by its window: second-order terms would take up the difference.
+        flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
     } else if (r.info.frequency_hz > 0 && !random &&
                (s.frequency_hz > 0 ? std::abs(s.frequency_hz - nominal_hz) > kOffFrequency_hz
                                    : s.kappa > kShaken)) {
         flag("the vibration is not at its commanded frequency within 0.05 Hz: dwell rejected",
              true);
+    } else if (r.stuck == 0 && r.gated > kMostGated * r.samples) {
+        flag(
+            "more than 12 % of the samples are beyond what the configured noise allows: dwell "
+            "rejected",
+            true);
     } else if (const char* alias =
                    aliases ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s) : "";
                *alias != '\0') {

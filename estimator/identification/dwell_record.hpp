@@ -13,6 +13,7 @@ struct DwellRecord {
     DwellInfo info;
     Seen seen;  ///< of this vibration by the accelerometers
     std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
+    std::uint32_t gated = 0;  ///< of the rejected: angles too far from the predicted ones
     double nis_sum = 0;
     std::uint32_t nis_count = 0;
     /// Sums of products of innovations with themselves and with those one sample before.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/identification_impl.hpp"
@@ -19,8 +18,6 @@ constexpr double kMostMissing = 20'000;
 constexpr int kBadTimesBeforeRestart = 5;
 /// Of kappa by eq. 13: what it is off by, all quadratic coefficients are.
 constexpr double kPaperTolerance = 0.01;
-constexpr auto kBufferCapacity =
-    static_cast<std::size_t>(VibrationLevel::kFirstWindow_s * VibrationLevel::kHighestRate_hz) + 1;
 
 const Settings& checked(const Settings& settings) {
     check(settings);
@@ -74,7 +71,9 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
                           s.accelerometer_zero_g[2]),
       stuck_(s),
       saturation_(s.accelerometer_g, s.accelerometer_range_g),
-      buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
+      buffer_(VibrationLevel::kFirstWindow_s,
+              std::max(VibrationLevel::kFirstWindow_s, s.level_window_s),
+              VibrationLevel::kHighestRate_hz),
       level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
       sync_(s.frequency_hz),
       paper_(s.frequency_hz, s.forgetting) {
@@ -248,12 +247,26 @@ StepResult Identification::Impl::accept(const Reading& reading) noexcept {
     if (buffer_.empty()) stretch_begin_s_ = reading.time_s;
     last_time_s_ = reading.time_s;
     buffer_.push(reading);
-    if (buffer_.full()) return replay();
+    if (buffer_.full() && !takes_longer()) return replay();
     StepResult step;
     step.outcome = !reading.angles_good  ? StepOutcome::bad_angles
                    : !reading.force_good ? StepOutcome::bad_force
                                          : StepOutcome::buffered;
     return step;
+}
+
+/// Beside a multiple of half the sample rate short windows know no level: those at the beginning
+/// of a dwell would show a change that is none.
+bool Identification::Impl::takes_longer() noexcept {
+    if (random_ || buffer_.waits_for() > VibrationLevel::kFirstWindow_s) return false;
+    const double hz = record_.info.frequency_hz;
+    const double shortest_s = VibrationLevel::shortest_window_s(hz > 0 ? hz : settings.frequency_hz,
+                                                                buffer_.period(period_s_));
+    // Beyond the longest window the dwell is refused.
+    if (!(shortest_s > VibrationLevel::kFirstWindow_s) || shortest_s > settings.level_window_s)
+        return false;
+    buffer_.wait_for(shortest_s);
+    return true;
 }
 
 /// The level of the buffered readings first, then the filter over all of them.

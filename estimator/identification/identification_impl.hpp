@@ -82,6 +82,7 @@ struct Identification::Impl {
     void begin_paper_level() noexcept;
     void take_paper_level(DwellSummary& summary) const noexcept;
     StepResult accept(const Reading& reading) noexcept;
+    [[nodiscard]] bool takes_longer() noexcept;
     StepResult leave_alone(const Measurement& measurement) noexcept;
     StepResult replay() noexcept;
     StepResult through_filter(const Reading& reading) noexcept;

@@ -1,10 +1,10 @@
 #include "estimator/identification/plan_report.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "estimator/filter/encoder_angles.hpp"
+#include "estimator/filter/text.hpp"
 #include "estimator/identification/observability.hpp"
 #include "estimator/identification/planned_covariance.hpp"
 #include "estimator/identification/two_step.hpp"
@@ -70,14 +70,10 @@ std::vector<std::string> plan_warnings(const PlanReport& report) {
     for (const Combination& combination : report.combinations) {
         std::string sum;
         for (const auto& [name, weight] : combination.weights) {
-            std::array<char, 32> size{};
-            std::snprintf(size.data(), size.size(), "%.6g ", std::abs(weight));
             sum += sum.empty() ? (weight < 0 ? "-" : "") : (weight < 0 ? " - " : " + ");
-            sum += (std::abs(weight) == 1.0 ? "" : size.data()) + name;
+            sum += (std::abs(weight) == 1.0 ? "" : text("%.6g ", std::abs(weight))) + name;
         }
-        std::array<char, 48> sigma{};
-        std::snprintf(sigma.data(), sigma.size(), ", expected sigma %.2g", combination.sigma);
-        lines.push_back("determined is " + sum + sigma.data());
+        lines.push_back("determined is " + sum + text(", expected sigma %.2g", combination.sigma));
     }
     return lines;
 }

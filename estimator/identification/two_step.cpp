@@ -1,7 +1,5 @@
 #include "estimator/identification/two_step.hpp"
 
-#include <cmath>
-
 namespace vibrig::estimator {
 
 ParameterArray two_step_prior(const ParameterArray& prior) noexcept {

@@ -3,11 +3,9 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
-#include <vector>
 
-#include "estimator/filter/measurement.hpp"
-#include "estimator/filter/settings.hpp"
 #include "estimator/filter/vibration_moment.hpp"
+#include "estimator/level/growing_blocks.hpp"
 
 namespace vibrig::estimator {
 
@@ -16,12 +14,11 @@ namespace vibrig::estimator {
 /// One stretch of a dwell at a time. Never allocates after construction.
 class GrowingTensor {
   public:
-    GrowingTensor();
     void clear() noexcept;
     /// Specific force, g: north, up, east.
     void add(const Eigen::Vector3d& force) noexcept;
     /// The time of a sample that there is not passes.
-    void add_missing() noexcept { advance(); }
+    void add_missing() noexcept { blocks_.add_missing(); }
 
     /// Grown enough since the last shape() to be worth another.
     [[nodiscard]] bool due() const noexcept;
@@ -32,20 +29,10 @@ class GrowingTensor {
   private:
     /// 1, three components, six products.
     static constexpr std::size_t kChannels = 10;
-    static constexpr std::size_t kBlocks = 128;
-    struct Block {
-        /// Sums of x, x tau, x tau^2 of each channel, tau from the block's centre.
-        std::array<std::array<double, kChannels>, 3> sum{};
-    };
-    void advance() noexcept;
-    void merge() noexcept;
     [[nodiscard]] std::array<double, kChannels> sums() const noexcept;
 
-    std::vector<Block> blocks_;
-    std::size_t full_ = 0;      ///< complete blocks
-    std::size_t length_ = 1;    ///< samples per block
-    std::size_t in_block_ = 0;  ///< samples in the block that grows
-    std::size_t count_ = 0, count_at_shape_ = 0;
+    GrowingBlocks<kChannels, 128> blocks_;
+    std::size_t count_at_shape_ = 0;
 };
 
 }  // namespace vibrig::estimator

@@ -38,64 +38,28 @@ HannMeans HannWindow::means(const double* ring, std::size_t capacity, std::size_
     return {sum / norm, square / norm};
 }
 
-GrowingHann::GrowingHann() : blocks_(kBlocks) {}
-
-void GrowingHann::clear() noexcept {
-    full_ = in_block_ = count_ = 0;
-    length_ = 1;
-    blocks_[0] = {};
-}
-
-void GrowingHann::add(double value) noexcept {
-    Block& block = blocks_[full_];
-    const double tau = static_cast<double>(in_block_) - 0.5 * static_cast<double>(length_ - 1);
-    const double square = value * value;
-    block.signal[0] += value;
-    block.signal[1] += value * tau;
-    block.signal[2] += value * tau * tau;
-    block.square[0] += square;
-    block.square[1] += square * tau;
-    block.square[2] += square * tau * tau;
-    ++count_;
-    if (++in_block_ < length_) return;
-    in_block_ = 0;
-    if (++full_ == kBlocks) merge();
-    blocks_[full_] = {};
-}
-
-void GrowingHann::merge() noexcept {
-    const double half = 0.5 * static_cast<double>(length_);
-    const auto joined = [half](const std::array<double, 3>& a, const std::array<double, 3>& b) {
-        return std::array<double, 3>{a[0] + b[0], a[1] - half * a[0] + b[1] + half * b[0],
-                                     a[2] - 2.0 * half * a[1] + half * half * a[0] + b[2] +
-                                         2.0 * half * b[1] + half * half * b[0]};
-    };
-    for (std::size_t k = 0; k < kBlocks / 2; ++k) {
-        const Block &a = blocks_[2 * k], &b = blocks_[2 * k + 1];
-        blocks_[k] = {joined(a.signal, b.signal), joined(a.square, b.square)};
-    }
-    full_ = kBlocks / 2;
-    length_ *= 2;
-}
-
 HannMeans GrowingHann::means() const noexcept {
-    if (count_ == 0) return {};
-    if (count_ == 1) return {blocks_[0].signal[0], blocks_[0].square[0]};
-    const double step = 2.0 * kPi / static_cast<double>(count_);
+    const auto blocks = blocks_.used();
+    const auto count = static_cast<double>(blocks_.count());
+    if (count == 0) return {};
+    if (count == 1) return {blocks[0][0][0], blocks[0][0][1]};
+    const double step = 2.0 * kPi / count;
     HannMeans means;
-    const std::size_t used = full_ + (in_block_ > 0 ? 1 : 0);
-    for (std::size_t k = 0; k < used; ++k) {
+    const std::size_t length = blocks_.length();
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
         const double centre =
-            static_cast<double>(k * length_) + 0.5 * static_cast<double>(length_ - 1);
+            static_cast<double>(k * length) + 0.5 * static_cast<double>(length - 1);
         const double c = std::cos(step * (centre + 0.5)), s = std::sin(step * (centre + 0.5));
-        const auto weighted = [&](const std::array<double, 3>& m) {
-            return m[0] - c * (m[0] - 0.5 * step * step * m[2]) + s * step * m[1];
+        const auto weighted = [&](std::size_t channel) {
+            const double zeroth = blocks[k][0][channel];
+            return zeroth - c * (zeroth - 0.5 * step * step * blocks[k][2][channel]) +
+                   s * step * blocks[k][1][channel];
         };
-        means.mean += weighted(blocks_[k].signal);
-        means.mean_square += weighted(blocks_[k].square);
+        means.mean += weighted(0);
+        means.mean_square += weighted(1);
     }
-    means.mean /= static_cast<double>(count_);
-    means.mean_square /= static_cast<double>(count_);
+    means.mean /= count;
+    means.mean_square /= count;
     return means;
 }
 

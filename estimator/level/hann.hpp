@@ -1,8 +1,9 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
+
+#include "estimator/level/growing_blocks.hpp"
 
 namespace vibrig::estimator {
 
@@ -25,31 +26,17 @@ class HannWindow {
     std::vector<double> weights_;
 };
 
-/// The same over all samples given, however many: n is not known in advance, so moments of blocks
-/// are kept and the weight is developed to second order about each block's centre. Blocks merge in
-/// pairs when there are too many; the phase of a block stays below 2 pi / 1024, so the third order
-/// is below 1e-8. Never allocates after construction.
+/// The same over all samples given, however many: n is not known in advance. The phase of a block
+/// stays below 2 pi / 1024, so the third order is below 1e-8. Never allocates after construction.
 class GrowingHann {
   public:
-    GrowingHann();
-    void clear() noexcept;
-    void add(double value) noexcept;
+    void clear() noexcept { blocks_.clear(); }
+    void add(double value) noexcept { blocks_.add({value, value * value}); }
     [[nodiscard]] HannMeans means() const noexcept;
-    [[nodiscard]] std::size_t count() const noexcept { return count_; }
+    [[nodiscard]] std::size_t count() const noexcept { return blocks_.count(); }
 
   private:
-    /// Sums of x, x tau, x tau^2 for x = signal and its square, tau from the block's centre.
-    struct Block {
-        std::array<double, 3> signal{}, square{};
-    };
-    void merge() noexcept;
-
-    static constexpr std::size_t kBlocks = 2048;
-    std::vector<Block> blocks_;
-    std::size_t full_ = 0;      ///< complete blocks
-    std::size_t length_ = 1;    ///< samples per block
-    std::size_t in_block_ = 0;  ///< samples in the block that grows
-    std::size_t count_ = 0;
+    GrowingBlocks<2, 2048> blocks_;  ///< of the signal and its square
 };
 
 }  // namespace vibrig::estimator

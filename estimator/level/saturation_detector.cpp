@@ -1,7 +1,6 @@
 #include "estimator/level/saturation_detector.hpp"
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 
 namespace vibrig::estimator {

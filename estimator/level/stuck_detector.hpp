@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 
-#include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
 
 namespace vibrig::estimator {

@@ -11,6 +11,16 @@ namespace {
 
 constexpr double kMostOfIt = 0.5;  ///< share of the mean square
 
+/// Of what aliases to nearly nothing, in a window that knows a level: 4, and a hundredth less,
+/// since what is planned at 4 is sampled by a clock that is a little off.
+constexpr double kLeastTurns = 3.96;
+
+/// How far from a multiple of the sample rate.
+double beside_hz(double frequency_hz, double rate_hz) noexcept {
+    const double m = std::max(1.0, std::round(frequency_hz / rate_hz));
+    return std::abs(frequency_hz - m * rate_hz);
+}
+
 std::size_t samples_in(double seconds, double period_s) noexcept {
     return static_cast<std::size_t>(std::max(1.0, std::round(seconds / period_s)));
 }
@@ -28,6 +38,9 @@ VibrationLevel::VibrationLevel(double window_s, double noise_g, double nominal_h
 void VibrationLevel::begin(double period_s) noexcept {
     period_s_ = period_s;
     window_ = std::min(samples_in(window_s_, period_s), ring_.size());
+    shortest_ = samples_in(std::clamp(shortest_window_s(nominal_hz_, period_s), kFirstWindow_s,
+                                      std::max(kFirstWindow_s, window_s_)),
+                           period_s);
     refresh_every_ = samples_in(kRefresh_s, period_s);
     fit_every_ = samples_in(1.0, period_s);
     next_ = filled_ = since_refresh_ = since_fit_ = fit_age_ = 0;
@@ -54,24 +67,18 @@ void VibrationLevel::prime() noexcept {
     refresh();
 }
 
-void VibrationLevel::add(double vertical_force_g) noexcept {
-    push(vertical_force_g, true);
-    whole_.add(vertical_force_g);
-    ++fit_age_;
-    after_push();
-}
+void VibrationLevel::add(double vertical_force_g) noexcept { take(vertical_force_g, true); }
 
 void VibrationLevel::add_missing() noexcept {
     // A hole would not average out: one missing peak of 6 g in 400 samples moves the mean by 3 %.
-    if (since_fit_ >= refresh_every_) fit(std::min(filled_, samples_in(kFirstWindow_s, period_s_)));
-    const double value = fitted().at(static_cast<double>(fit_age_) * period_s_);
-    push(value, false);
-    whole_.add(value);
-    ++fit_age_;
-    after_push();
+    if (since_fit_ >= refresh_every_) fit(std::min(filled_, shortest_));
+    take(fitted().at(static_cast<double>(fit_age_) * period_s_), false);
 }
 
-void VibrationLevel::after_push() noexcept {
+void VibrationLevel::take(double value, bool valid) noexcept {
+    push(value, valid);
+    whole_.add(value);
+    ++fit_age_;
     ++since_fit_;
     if (++since_refresh_ >= refresh_every_) refresh();
     if (since_fit_ >= fit_every_) fit(std::min(filled_, window_));
@@ -145,10 +152,12 @@ double VibrationLevel::frequency_hz() const noexcept {
 
 bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s,
                               int order) noexcept {
+    return beside_hz(order * frequency_hz, 1.0 / period_s) < kLeastTurns / window_s;
+}
+
+double VibrationLevel::shortest_window_s(double frequency_hz, double period_s) noexcept {
     const double rate = 1.0 / period_s;
-    const double product = order * frequency_hz;
-    const double m = std::max(1.0, std::round(product / rate));
-    return std::abs(product - m * rate) < 4.0 / window_s;
+    return kLeastTurns / std::min(beside_hz(frequency_hz, rate), beside_hz(2 * frequency_hz, rate));
 }
 
 const char* VibrationLevel::aliasing(double frequency_hz, double period_s,

@@ -58,6 +58,8 @@ class VibrationLevel {
     /// wrong by up to e a0^2 / kappa and e^2 a0^2 / (2 kappa) for a harmonic of relative size e.
     [[nodiscard]] static bool excluded(double frequency_hz, double period_s, double window_s,
                                        int order = 2) noexcept;
+    /// From how long a window on neither the vibration nor its square is excluded, s.
+    [[nodiscard]] static double shortest_window_s(double frequency_hz, double period_s) noexcept;
     /// What a harmonic of the shaker does to the level at this sample period, orders 3 to 5 of
     /// excluded(); empty: nothing. Static text.
     [[nodiscard]] static const char* aliasing(double frequency_hz, double period_s,
@@ -65,7 +67,7 @@ class VibrationLevel {
 
   private:
     void push(double value, bool valid) noexcept;
-    void after_push() noexcept;
+    void take(double value, bool valid) noexcept;
     void refresh() noexcept;
     /// To the newest samples; done when somebody asks for it, mostly nobody does.
     void fit(std::size_t samples) noexcept;
@@ -80,7 +82,7 @@ class VibrationLevel {
     std::unique_ptr<bool[]> valid_;
     HannWindow hann_;
     std::size_t next_ = 0, filled_ = 0;
-    std::size_t window_ = 0, refresh_every_ = 1, fit_every_ = 1;
+    std::size_t window_ = 0, shortest_ = 0, refresh_every_ = 1, fit_every_ = 1;
     std::size_t since_refresh_ = 0, since_fit_ = 0;
     GrowingHann whole_;
     mutable Vibration fit_;

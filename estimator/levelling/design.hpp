@@ -3,7 +3,6 @@
 #include <array>
 #include <complex>
 #include <stdexcept>
-#include <string>
 
 /// Levelling of one horizontal channel by external damping with a forward path: Zha et al. 2019,
 /// "A Fast Damping Algorithm for INS with External Velocity Reference".

@@ -26,9 +26,8 @@ class FastNetwork {
     /// From now on with zero gains, without a step in the command.
     void become_undamped(double reference, const Gains& gains) noexcept;
 
-    [[nodiscard]] double velocity() const noexcept { return v_; }  ///< m/s, follows the reference
-    [[nodiscard]] double w() const noexcept { return w_; }         ///< m/s, velocity - reference
-    [[nodiscard]] double z() const noexcept { return z_; }         ///< m/s
+    [[nodiscard]] double w() const noexcept { return w_; }  ///< m/s, velocity - reference
+    [[nodiscard]] double z() const noexcept { return z_; }  ///< m/s
     [[nodiscard]] double drift() const noexcept { return z_ / radius_m_; }  ///< rad/s
 
   private:

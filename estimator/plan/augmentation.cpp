@@ -16,18 +16,15 @@ constexpr int kMissingPower = 6;
 constexpr int kMostPasses = 12;
 constexpr double kLeastGain = 1e-6;
 
+using ByRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 /// In units of the targets, or of the present standard error where there is none.
 class RunSearch {
   public:
     RunSearch(const std::vector<double>& covariance, const std::vector<Experiment>& experiments,
               const std::vector<double>& target)
         : p_(at(target.size())), wanted_(p_), scale_(p_) {
-        Matrix p0(p_, p_);
-        for (Eigen::Index i = 0; i < p_; ++i) {
-            for (Eigen::Index j = 0; j < p_; ++j) {
-                p0(i, j) = covariance[static_cast<std::size_t>(i * p_ + j)];
-            }
-        }
+        const Matrix p0 = Eigen::Map<const ByRows>(covariance.data(), p_, p_);
         for (Eigen::Index i = 0; i < p_; ++i) {
             const double t = target[static_cast<std::size_t>(i)];
             wanted_[i] = t > 0 ? 1.0 : 0.0;
@@ -42,14 +39,9 @@ class RunSearch {
         const Vector change = scale_.cwiseQuotient(present);
         information_ = change.asDiagonal() * factor->inverse() * change.asDiagonal();
         for (const Experiment& experiment : experiments) {
-            const auto r = at(experiment.rows.size()) / p_;
-            Matrix rows(r, p_);
-            for (Eigen::Index i = 0; i < r; ++i) {
-                for (Eigen::Index k = 0; k < p_; ++k) {
-                    rows(i, k) = experiment.rows[static_cast<std::size_t>(i * p_ + k)] * scale_[k];
-                }
-            }
-            rows_.push_back(std::move(rows));
+            const Eigen::Map<const ByRows> rows(experiment.rows.data(),
+                                                at(experiment.rows.size()) / p_, p_);
+            rows_.emplace_back(rows * scale_.asDiagonal());
             cost_.push_back(experiment.cost);
         }
         invert();

@@ -1,14 +1,13 @@
 #include "estimator/plan/calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/text.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {
@@ -21,11 +20,7 @@ constexpr double kMustFit = 1e-6;
 
 bool stated(const std::vector<Reading>& readings) { return readings.front().sigma > 0; }
 
-std::string short_number(double value) {
-    std::array<char, 40> out{};
-    std::snprintf(out.data(), out.size(), "%g", value);
-    return out.data();
-}
+std::string short_number(double value) { return text("%g", value); }
 
 void check_size(const std::string& place, double value, double largest) {
     if (std::abs(value) <= largest) return;

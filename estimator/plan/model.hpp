@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 namespace vibrig::estimator::plan {

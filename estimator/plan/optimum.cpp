@@ -163,12 +163,6 @@ void kiefer(const Problem& problem, int q, const Visit& visit) {
 
 }  // namespace
 
-Effort Optimum::effort(const Problem& problem) const {
-    Effort result(share);
-    for (std::size_t i = 0; i < result.size(); ++i) result[i] /= problem.points[i].cost;
-    return result;
-}
-
 Optimum d_optimum(const Problem& problem, double gap, std::size_t most_iterations) {
     require_full_rank(problem);
     Vector scale;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "estimator/plan/model.hpp"
 
@@ -13,9 +12,6 @@ struct Optimum {
     double gap = 0;      ///< max d - p
     double bound = 1;    ///< p / max d
     std::size_t iterations = 0;
-
-    /// Runs per unit of effort, as evaluate() takes them.
-    [[nodiscard]] Effort effort(const Problem& problem) const;
 };
 
 inline constexpr double kGap = 1e-7;

@@ -36,7 +36,6 @@ MatrixXd prior_sigmas(const Settings& settings) {
     return out;
 }
 
-/// The rates of a gyro with the groups model, what is not known of their vibration in the noise.
 /// Of gyro j's rate; `shaken`: its part due to the vibration.
 double variance_of(const SpectralDwell& dwell, std::size_t j, double shaken) {
     const double level = dwell.relative_error * shaken;
@@ -62,6 +61,7 @@ void put_noise(const SpectralTable& table, const std::array<MatrixXd, 3>& gains,
     }
 }
 
+/// The rates of a gyro with the groups model, what is not known of their vibration in the noise.
 uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::DwellTable& times,
                                 const VectorXd& prior, std::size_t j, const MatrixXd& shaken) {
     uncertainty::GyroRates gyro;
@@ -121,8 +121,8 @@ MatrixXd joint_covariance(const SpectralTable& table, const std::array<MatrixXd,
 }
 
 /// One gyro's form: none, one or two resonances, as asked for and as the rates need.
-void settle(const SpectralTable& table, std::size_t j, const GyroProblem& problem,
-            const MatrixXd& declared, Form form, Analysis& out) {
+void settle(const SpectralTable& table, std::size_t j, const GyroProblem& problem, Form form,
+            Analysis& out) {
     Mixture& mixture = out.gyros[j];
     const bool at_one = table.kinds().size() < 2 && problem.swept.empty();
     if (form == Form::flat || form == Form::groups || at_one) {
@@ -136,7 +136,7 @@ void settle(const SpectralTable& table, std::size_t j, const GyroProblem& proble
     for (const Hypothesis& one : mixture.list) all += one.weight;
     for (Hypothesis& one : mixture.list) one.weight /= all;
     // What is declared is no lack of fit.
-    const MatrixXd null = problem.covariance + declared * declared.transpose();
+    const MatrixXd null = problem.covariance + problem.declared * problem.declared.transpose();
     const auto tail = [&](const Mixture& of) {
         const Hypothesis& best = of.list.front();
         const VectorXd left = problem.rate - design(table, j, best.resonances) * best.x;
@@ -309,8 +309,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         for (int pass = 0; pass < (twice ? 2 : 1); ++pass) {
             auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
             gyro.breaks = uncertainty::breaks_of(times, settings.drift);
-            groups[j] = uncertainty::average_drift(gyro, settings.drift);
-            const uncertainty::DriftAverage& average = groups[j];
+            const auto& average = groups[j] = uncertainty::average_drift(gyro, settings.drift);
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
@@ -332,8 +331,10 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.root),
             prior, scattered);
     }
-    for (std::size_t j = 0; j < 3; ++j)
-        settle(table, j, problems[j], of_gyro(declared.root, static_cast<Index>(j)), form, out);
+    for (std::size_t j = 0; j < 3; ++j) {
+        problems[j].declared = of_gyro(declared.root, static_cast<Index>(j));
+        settle(table, j, problems[j], form, out);
+    }
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
     for (std::size_t j = 0; j < 3; ++j)
         gains[j] = form == Form::groups ? MatrixXd(groups[j].gain.topRows(kBase))

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <string>
 #include <vector>
 
 #include "estimator/spectrum/flatness.hpp"

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -15,12 +16,6 @@ constexpr double kSigmas = 4;    ///< docs/theory/spectrum.md
 constexpr double kBands_db = 3;  ///< beyond it the interlock stops a random vibration
 constexpr double kLeastAlike = 0.5;
 constexpr double kNothing = 1e-9;  ///< of the largest density
-
-std::string text(const char* form, double a, double b) {
-    std::array<char, 240> out{};
-    std::snprintf(out.data(), out.size(), form, a, b);
-    return out.data();
-}
 
 std::string at(std::size_t i) { return "psd_block[" + std::to_string(i) + "]: "; }
 
@@ -38,7 +33,7 @@ std::string malformed(Pairs pairs) {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
         const auto [hz, density] = pairs[i];
         if (!std::isfinite(hz) || !(hz > 0))
-            return at(i) + text("found %g Hz, expected a frequency above 0", hz, 0);
+            return at(i) + text("found %g Hz, expected a frequency above 0", hz);
         if (i > 0 && !(hz > pairs[i - 1][0]))
             return at(i) + text("found %g Hz after %g Hz, expected rising frequencies", hz,
                                 pairs[i - 1][0]);
@@ -97,7 +92,7 @@ std::string contradicted(const Profile& psd, const PsdExpected& expected) {
         if (!(std::abs(power / (measured * measured) - 1) <= most))
             return text("psd_block: found %.4g g rms, expected the %.4g g of measured_g_rms ", rms,
                         measured) +
-                   text("within %.2g of the mean square", most, 0);
+                   text("within %.2g of the mean square", most);
     }
     if (const double share = alike(nominal, bands); share < kLeastAlike)
         return text(

@@ -3,8 +3,6 @@
 #include <array>
 #include <span>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "estimator/spectrum/profile.hpp"
 

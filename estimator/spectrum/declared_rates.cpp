@@ -1,25 +1,12 @@
 #include "estimator/spectrum/declared_rates.hpp"
 
-#include <sstream>
-#include <string>
-
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/filter/text.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/signatures.hpp"
 
 namespace vibrig::estimator::spectrum {
-
-namespace {
-
-/// "25.1 Hz".
-std::string hz_text(double hz) {
-    std::ostringstream text;
-    text << hz << " Hz";
-    return text.str();
-}
-
-}  // namespace
 
 DeclaredRates declared_rates(const Settings& settings, const SpectralTable& table,
                              const Eigen::MatrixXd& groups, const Eigen::MatrixXd& shaken) {
@@ -63,7 +50,7 @@ DeclaredRates declared_rates(const Settings& settings, const SpectralTable& tabl
         }
         const Kind& of = table.kinds()[kind];
         out.effects.push_back({"gain_between_frequencies",
-                               of.profile.empty() ? hz_text(of.hz()) : of.profile,
+                               of.profile.empty() ? text("%g Hz", of.hz()) : of.profile,
                                {},
                                scatter});
     }

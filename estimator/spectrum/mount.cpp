@@ -4,20 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/filter/accelerometer_response.hpp"
 #include "estimator/spectrum/profile.hpp"
 
 namespace vibrig::estimator::spectrum {
-
-namespace {
-
-/// Between two neighbours of what rises in frequency.
-double straight(const std::pair<double, double>& below, const std::pair<double, double>& above,
-                double hz) {
-    const double part = std::log(hz / below.first) / std::log(above.first / below.first);
-    return below.second * std::pow(above.second / below.second, part);
-}
-
-}  // namespace
 
 std::optional<double> Mount::transmission(double hz) const {
     if (hard) return 1.0;
@@ -27,7 +17,7 @@ std::optional<double> Mount::transmission(double hz) const {
     if (above == measured.end() || (above == measured.begin() && above->first > hz))
         return std::nullopt;
     if (above->first == hz) return above->second;
-    return straight(*(above - 1), *above, hz);
+    return log_straight(*(above - 1), *above, hz);
 }
 
 double power_ratio(std::span<const std::pair<double, double>> ratios, std::span<const Band> bands) {
@@ -38,7 +28,7 @@ double power_ratio(std::span<const std::pair<double, double>> ratios, std::span<
             std::ranges::find_if(ratios, [&](const auto& point) { return point.first >= band.hz; });
         const double ratio = above == ratios.begin() ? above->second
                              : above == ratios.end() ? ratios.back().second
-                                                     : straight(*(above - 1), *above, band.hz);
+                                                     : log_straight(*(above - 1), *above, band.hz);
         sum += band.share * ratio * ratio;
     }
     return sum;

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <limits>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -133,7 +134,6 @@ class Likelihood {
         return out;
     }
 
-    static constexpr double kPi = 3.14159265358979323846;
     const SpectralTable& table_;
     std::size_t gyro_;
     const GyroProblem& problem_;
@@ -364,6 +364,27 @@ void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& pro
                                                (gain(table, gyro, problem, best) * x).trace()));
 }
 
+/// Of the one model over the other.
+double log_odds(const std::vector<Node>& nodes, const Solved& flat) {
+    if (nodes.empty()) return -std::numeric_limits<double>::infinity();
+    const double most = std::ranges::max(nodes, {}, &Node::log_weight).log_weight;
+    double sum = 0;
+    for (const Node& node : nodes) sum += std::exp(node.log_weight - most);
+    return most - flat.log_evidence + std::log(sum);
+}
+
+/// How much less likely a resonance is where inputs may differ as declared: what they explain is
+/// none.
+double declared_explains(const SpectralTable& table, std::size_t gyro, GyroProblem problem,
+                         double without) {
+    if (problem.declared.size() == 0 || !(without > 0)) return 0;
+    problem.covariance += problem.declared * problem.declared.transpose();
+    const Likelihood likelihood(table, gyro, problem);
+    std::vector<Node> nodes;
+    for (const Point& top : scan(likelihood)) add_nodes(likelihood, top, nodes);
+    return std::max(0.0, without - log_odds(nodes, likelihood.flat()));
+}
+
 }  // namespace
 
 MatrixXd swept_design(const SweptRates& swept, const std::vector<Resonance>& resonances) {
@@ -412,6 +433,8 @@ Mixture one_resonance(const SpectralTable& table, std::size_t gyro, const GyroPr
     const std::vector<Point> tops = scan(likelihood);
     for (const Point& top : tops) add_nodes(likelihood, top, nodes);
     Solved flat = likelihood.flat();
+    const double declared = declared_explains(table, gyro, problem, log_odds(nodes, flat));
+    for (Node& node : nodes) node.log_weight -= declared;
     double most = flat.log_evidence;
     for (const Node& node : nodes) most = std::max(most, node.log_weight);
     double resonant = 0;

@@ -16,6 +16,9 @@ struct GyroProblem {
     Eigen::MatrixXd covariance;   ///< n x n
     Eigen::VectorXd prior_sigma;  ///< 10, filter order
     std::vector<SweptRates> swept{};
+    /// n x inputs: what each declared input does to the rates with its sigma. Not in `covariance`;
+    /// a resonance is weighed with it.
+    Eigen::MatrixXd declared{};
 };
 
 /// Coefficients for given resonances: 10 static ones (filter order), then six elastic ones for

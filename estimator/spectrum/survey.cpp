@@ -1,12 +1,11 @@
 #include "estimator/spectrum/survey.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/text.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -21,11 +20,7 @@ constexpr std::size_t kFirst = 14;
 constexpr double kTogether = 0.02;  ///< closer ones are one frequency, relative
 constexpr Index kSquares = 6;
 
-std::string short_text(double value) {
-    std::array<char, 32> out{};
-    std::snprintf(out.data(), out.size(), "%.6g", value);
-    return out.data();
-}
+std::string short_text(double value) { return text("%.6g", value); }
 
 /// [1, u, u u'] of a direction.
 MatrixXd direction_rows(const std::vector<plan::Vec3>& ups) {

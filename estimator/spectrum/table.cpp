@@ -1,8 +1,6 @@
 #include "estimator/spectrum/table.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"

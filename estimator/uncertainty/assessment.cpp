@@ -255,9 +255,17 @@ const char* word_of(Level level) noexcept {
 }
 
 void take_sync(std::span<const DwellRow> rows, Assessment& to) {
+    const auto peak_square = [](const DwellRow& row) {
+        return row.frequency_hz > 0 ? 2 * (row.vibration.kappa - 1) : 0.0;
+    };
+    double strongest = 0;
+    for (const DwellRow& row : rows)
+        if (!row.apart) strongest = std::max(strongest, peak_square(row));
     for (const DwellRow& row : rows) {
-        const double a0_square = 2 * (row.vibration.kappa - 1);
-        if (!(a0_square > 0) || !(row.frequency_hz > 0)) continue;
+        if (!(peak_square(row) > 0)) continue;
+        // Coefficients of one frequency follow from its strongest vibration: a drift beside a weak
+        // one, were it but the noise of the angles, moves them by what it is beside that.
+        const double a0_square = row.apart ? peak_square(row) : strongest;
         to.sync_arcsec = std::max(to.sync_arcsec, row.sync_arcsec);
         to.sync_bound =
             std::max(to.sync_bound, coning_bound(row.frequency_hz, row.sync_arcsec, a0_square));

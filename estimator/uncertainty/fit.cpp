@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/fit.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "estimator/filter/linear_algebra.hpp"
@@ -58,7 +57,10 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
 
     const MatrixXd y = whitened(all_rates(table));
     y_left_ = left(y);
-    chi_square_ = y_left_.dot(y.col(0));
+    // y' Q0 y holds what the prior says of the coefficients: how large they are is no lack of fit.
+    const VectorXd fitted =
+        VectorXd(normal_->solve(white_.transpose() * y).col(0)).head(kCoefficients);
+    chi_square_ = y_left_.dot(y.col(0)) - fitted.cwiseAbs2().dot(prior_information);
 
     MatrixXd constant = of_data;
     constant.diagonal() += prior_information;

@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/freed.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "estimator/filter/linear_algebra.hpp"

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {
@@ -88,12 +88,10 @@ std::vector<Leverage> leverages(const Assessment& assessed) {
 
 std::string advice(const Leverage& of) {
     const std::size_t kind = of.strongest();
-    std::array<char, 320> text{};
-    std::snprintf(
-        text.data(), text.size(), "%s (%s%s) would make U of the %s %.2f times what it is at best",
-        of.remedy().c_str(), of.input.c_str(),
-        of.declared || of.u == 0 ? "" : ", not declared so far", kind_name(kind), of.without[kind]);
-    return text.data();
+    return text("%s (%s%s) would make U of the %s %.2f times what it is at best",
+                of.remedy().c_str(), of.input.c_str(),
+                of.declared || of.u == 0 ? "" : ", not declared so far", kind_name(kind),
+                of.without[kind]);
 }
 
 }  // namespace vibrig::estimator::uncertainty

@@ -1,7 +1,5 @@
 #include "estimator/uncertainty/planned.hpp"
 
-#include <cmath>
-
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 namespace vibrig::estimator::uncertainty {

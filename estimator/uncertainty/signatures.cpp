@@ -37,10 +37,11 @@ class Builder {
         out_.unit = unit;
     }
     /// One more unknown; `set` gives the disturbance a size in SI units, `in_unit` is one unit.
-    void add(std::string element, double in_unit,
-             const std::function<void(Disturbance&, double)>& set) {
+    Builder& add(std::string element, double in_unit,
+                 const std::function<void(Disturbance&, double)>& set) {
         push(std::move(element),
              out_.size * in_unit * signature(table_, model_, set, out_.size * in_unit));
+        return *this;
     }
     /// A drift of one gyro, deg/h, with the number of the row.
     template <class Of>
@@ -132,27 +133,23 @@ VectorXd signature(const DwellTable& table, const ForwardModel& model,
 Signatures signatures(Misfit misfit, const DwellTable& table, const ForwardModel& model, double s0,
                       int after_dwell) {
     switch (misfit) {
-        case Misfit::cross_axis: {
-            Builder of(table, model, 0.02, "");
-            of.add("north", 1, [](Disturbance& d, double x) { d.cross_north = x; });
-            of.add("east", 1, [](Disturbance& d, double x) { d.cross_east = x; });
-            return of.take();
-        }
-        case Misfit::azimuth: {
-            Builder of(table, model, 3, "arcmin");
-            of.add("", kRadPerArcmin, [](Disturbance& d, double x) { d.azimuth_rad = x; });
-            return of.take();
-        }
-        case Misfit::latitude: {
-            Builder of(table, model, 3, "arcmin");
-            of.add("", kRadPerArcmin, [](Disturbance& d, double x) { d.latitude_rad = x; });
-            return of.take();
-        }
-        case Misfit::time_base: {
-            Builder of(table, model, 2e-4, "");
-            of.add("", 1, [](Disturbance& d, double x) { d.time_base = x; });
-            return of.take();
-        }
+        case Misfit::cross_axis:
+            return Builder(table, model, 0.02, "")
+                .add("north", 1, [](Disturbance& d, double x) { d.cross_north = x; })
+                .add("east", 1, [](Disturbance& d, double x) { d.cross_east = x; })
+                .take();
+        case Misfit::azimuth:
+            return Builder(table, model, 3, "arcmin")
+                .add("", kRadPerArcmin, [](Disturbance& d, double x) { d.azimuth_rad = x; })
+                .take();
+        case Misfit::latitude:
+            return Builder(table, model, 3, "arcmin")
+                .add("", kRadPerArcmin, [](Disturbance& d, double x) { d.latitude_rad = x; })
+                .take();
+        case Misfit::time_base:
+            return Builder(table, model, 2e-4, "")
+                .add("", 1, [](Disturbance& d, double x) { d.time_base = x; })
+                .take();
         case Misfit::encoder_zero: {
             Builder of(table, model, 1, "arcmin");
             for (std::size_t k = 0; k < 3; ++k)
@@ -160,14 +157,13 @@ Signatures signatures(Misfit misfit, const DwellTable& table, const ForwardModel
                        [k](Disturbance& d, double x) { d.encoder_zero_rad[k] = x; });
             return of.take();
         }
-        case Misfit::non_orthogonality: {
-            Builder of(table, model, 1, "arcmin");
-            of.add("outer-inner", kRadPerArcmin,
-                   [](Disturbance& d, double x) { d.non_orthogonality_rad[0] = x; });
-            of.add("inner-azimuth", kRadPerArcmin,
-                   [](Disturbance& d, double x) { d.non_orthogonality_rad[1] = x; });
-            return of.take();
-        }
+        case Misfit::non_orthogonality:
+            return Builder(table, model, 1, "arcmin")
+                .add("outer-inner", kRadPerArcmin,
+                     [](Disturbance& d, double x) { d.non_orthogonality_rad[0] = x; })
+                .add("inner-azimuth", kRadPerArcmin,
+                     [](Disturbance& d, double x) { d.non_orthogonality_rad[1] = x; })
+                .take();
         case Misfit::resolver_1:
             return resolver(table, model, 1, 20);
         case Misfit::resolver_2:

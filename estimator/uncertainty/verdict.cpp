@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/filter/text.hpp"
+#include "estimator/uncertainty/skew.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {
@@ -18,13 +19,6 @@ constexpr double kNearBest = 3.0;  ///< of the logarithm of the odds
 constexpr double kMostWidening = 5.0;
 constexpr double kMostStep = 10.0;
 constexpr double kMostInput = 5.0;  ///< deg/h/g, mean of the three input-axis terms
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 320> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
 
 std::string dwell_name(const Assessment& a, int dwell) {
     std::string name = "dwell " + std::to_string(dwell);
@@ -372,6 +366,8 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     // angles that move with the vibration look like noise.
     if (a.done) {
         if (auto reason = motion_in_step(settings, a)) list.push_back(std::move(*reason));
+        if (auto reason = accelerometers_apart(settings, result.rows, a))
+            list.push_back(std::move(*reason));
         add_patterns(settings, a, stage, list);
         add_chi_square(a, list);
         add_order(settings, a, list);

@@ -6,7 +6,6 @@
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
-#include "estimator/zeros/units.hpp"
 
 namespace vibrig::estimator::zeros {
 namespace {

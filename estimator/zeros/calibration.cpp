@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/zeros/azimuth_gain.hpp"

@@ -1,7 +1,6 @@
 #include "estimator/zeros/observability.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
@@ -175,20 +174,17 @@ void check_observable(const SlewPlan& plan, const Site& site) {
     if (found.sufficient()) {
         return;
     }
-    std::array<char, 160> text{};
-    if (found.rank < kStates) {
-        std::snprintf(text.data(), text.size(),
-                      "slew plan: rank %d of 15, x and y zeros cannot be told from tilt; not "
-                      "observable: ",
-                      found.rank);
-    } else {
-        std::snprintf(
-            text.data(), text.size(),
-            "slew plan: smallest singular value %.2g of the scaled system, expected at least "
-            "%.0e; hardly observable: ",
-            found.singular[kStates - 1], kWeakest);
-    }
-    throw ZeroError(text.data() + found.unobservable());
+    const std::string why =
+        found.rank < kStates
+            ? text(
+                  "slew plan: rank %d of 15, x and y zeros cannot be told from tilt; not "
+                  "observable: ",
+                  found.rank)
+            : text(
+                  "slew plan: smallest singular value %.2g of the scaled system, expected at "
+                  "least %.0e; hardly observable: ",
+                  found.singular[kStates - 1], kWeakest);
+    throw ZeroError(why + found.unobservable());
 }
 
 }  // namespace vibrig::estimator::zeros

@@ -2,9 +2,8 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdio>
-#include <string>
 
+#include "estimator/filter/text.hpp"
 #include "estimator/zeros/calibration.hpp"
 
 namespace vibrig::estimator::zeros {
@@ -15,14 +14,6 @@ namespace vibrig::estimator::zeros {
     Eigen::Matrix3d m;
     for (Eigen::Index i = 0; i < 3; ++i) m.row(i) = vector(rows[static_cast<std::size_t>(i)]);
     return m;
-}
-
-/// printf into a string, at most 320 characters.
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 320> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
 }
 
 }  // namespace vibrig::estimator::zeros

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "estimator/allan/dwell_basis.hpp"
+#include "estimator/allan/edf.hpp"
 
 namespace {
 

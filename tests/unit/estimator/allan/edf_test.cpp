@@ -65,6 +65,40 @@ TEST(NoiseIdentification, DoesNotMistakeARowOfWhiteNoise) {
         << "of " << rows << ", seeds from 5000";
 }
 
+TEST(NoiseIdentification, WhereTwoNoisesCrossTheIntervalIsNotTooNarrow) {
+    // GIVEN angle quantisation that a rate random walk takes over from, with or without white noise
+    for (const Terms& terms :
+         {Terms{0.1, 0.001, 0, 0.02, 0}, Terms{0.1, 0, 0, 0.02, 0}, Terms{0.1, 0, 0, 0.2, 0}}) {
+        for (unsigned run = 0; run < 2; ++run) {
+            const Series series =
+                Series::from_rate(synthetic_rate(terms, 36000, 1.0, 300 + run), 1.0);
+            const auto rows = deviations(series, Statistic::oadev, octave_factors(4096));
+            // THEN longer averages never have more degrees of freedom
+            for (std::size_t k = 2; k < rows.size(); ++k)
+                EXPECT_LE(rows[k].edf, rows[k - 1].edf)
+                    << "m = " << rows[k].m << ", seed " << 300 + run;
+        }
+    }
+    // AND they are no more than the values' own scatter shows
+    constexpr int kRuns = 200;
+    constexpr std::size_t kShort = 2000;
+    for (const std::size_t m : {16U, 32U}) {
+        double sum = 0, squares = 0, stated = 0;
+        for (unsigned run = 0; run < kRuns; ++run) {
+            const Series series = Series::from_rate(
+                synthetic_rate({0.1, 0.001, 0, 0.02, 0}, kShort, 1.0, 40'000 + run), 1.0);
+            const Point point =
+                deviations(series, Statistic::oadev, std::vector<std::size_t>{m})[0];
+            sum += point.dev * point.dev / kRuns;
+            squares += std::pow(point.dev, 4) / kRuns;
+            stated += point.edf / kRuns;
+        }
+        const double found = 2 * sum * sum / (squares - sum * sum);
+        EXPECT_LE(stated, found * (1 + 4 * std::sqrt(2.0 / kRuns)))
+            << "m = " << m << ", seeds from 40000";
+    }
+}
+
 TEST(Interval, TotalDeviationOfWhitePhaseKnowsItsReflectedEnds) {
     // GIVEN white phase WHEN its total variance is taken 1000 times
     constexpr int kRuns = 1000;

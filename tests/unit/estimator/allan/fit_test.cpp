@@ -260,51 +260,6 @@ TEST(Classical, MultipliersMapItToTheAllanVariance) {
     EXPECT_DOUBLE_EQ(allan_multiplier(2), -6);
 }
 
-/// Double integral of the autocorrelation by the midpoint rule.
-double integrated(const Oscillation& o, double tau) {
-    constexpr int kSteps = 200000;
-    double sum = 0;
-    for (int i = 0; i < kSteps; ++i) {
-        const double t = (i + 0.5) * tau / kSteps;
-        sum += (tau - t) * std::exp(-t / o.tm) * std::cos(o.om * t);
-    }
-    return 2 * o.s * o.s * sum * (tau / kSteps) / (tau * tau);
-}
-
-TEST(Classical, ExactVarianceIsTheDoubleIntegralOfTheAutocorrelation) {
-    for (const double om : {0.0, 0.003, 0.1}) {
-        const Oscillation o{0.7, 120, om};
-        for (const double tau : {0.5, 1.5, 30.0, 400.0}) {
-            EXPECT_NEAR(classical_variance({&o, 1}, 0, tau), integrated(o, tau), 1e-8)
-                << "om " << om << " tau " << tau;
-        }
-    }
-}
-
-TEST(Classical, LimitsHoldForSlowAndFastOscillations) {
-    const auto sum = [](const Polynomial& a, double tau, std::initializer_list<std::size_t> terms) {
-        double value = 0;
-        for (const std::size_t k : terms) {
-            value += a[k] * std::pow(tau, kPowers[k]);
-        }
-        return value;
-    };
-    const Oscillation slow{0.5, 1e4, 1e-4};
-    EXPECT_NEAR(classical_variance({&slow, 1}, 0, 100), sum(limits_of(slow), 100, {0, 1, 2}), 1e-7);
-    const Oscillation fast{0.5, 2, 1.5};
-    EXPECT_NEAR(classical_variance({&fast, 1}, 0, 1e3), sum(limits_of(fast), 1e3, {3, 4}), 1e-12);
-}
-
-TEST(Classical, ASlowOscillationLooksLikeRateRandomWalk) {
-    // GIVEN tau much below tm WHEN the Allan variance is taken THEN K^2 = 2 s^2 / tm (per second)
-    const Oscillation o{0.02, 5400, 0};
-    const double tau = 20;
-    // Of a stationary process.
-    const double allan =
-        2 * (classical_variance({&o, 1}, 0, tau) - classical_variance({&o, 1}, 0, 2 * tau));
-    EXPECT_NEAR(allan, 2 * o.s * o.s / o.tm * tau / 3, 1e-8);
-}
-
 std::vector<ClassicalPoint> curve_of(const Polynomial& a, bool minus_window) {
     std::vector<ClassicalPoint> curve;
     for (const std::size_t m : log_factors(1200, 20)) {

@@ -29,7 +29,7 @@ TEST(Kinematics, OtherVerticalsAreCyclicPermutations) {
             s.azimuth_deg =
                 90;  // the rig's north axis looks east: true north is behind its east axis
             const Kinematics k(s);
-            EXPECT_EQ(k.up_reference()[axis], sign);
+            EXPECT_EQ(k.level()(axis, 1), sign);
             const double horizontal = kEarthRateDegPerHour * std::cos(s.latitude_deg * kPi / 180);
             EXPECT_NEAR(k.earth_rate_reference()[(axis + 1) % 3], -sign * horizontal, 1e-12);
             EXPECT_NEAR(k.earth_rate_reference()[(axis + 2) % 3], 0, 1e-12);

@@ -165,23 +165,31 @@ TEST(UdFilter, NisIsThatOfTheFullInnovationCovariance) {
     std::array<double, 30> sigma{};
     sigma.fill(3);
     UdFilter ud(sigma);
+    DenseFilter dense;
+    for (std::size_t i = 3; i < kN; ++i) dense.at(i, i) = 9;
     ud.start_angles({1, 2, 3}, 4);
-    ud.predict(transition(1, random, 0.1));
-    const UdFilter::Matrix3 p = ud.angle_covariance();
+    dense.start({1, 2, 3}, 4);
+    const UdFilter::Transition t = transition(1, random, 0.1);
+    ud.predict(t);
+    dense.predict(t);
     const UdFilter::Vector3 x = ud.angles();
     const double r = 4;
     // s = p + r I, nis = n' s^-1 n by Cramer's rule
-    UdFilter::Matrix3 s = p;
-    for (std::size_t k = 0; k < 3; ++k) s[k][k] += r;
+    using Matrix3 = std::array<std::array<double, 3>, 3>;
+    Matrix3 s{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) s[i][k] = static_cast<double>(dense.at(i, k));
+        s[i][i] += r;
+    }
     const UdFilter::Vector3 n{3, -7, 11};
-    const auto det = [](const UdFilter::Matrix3& m) {
+    const auto det = [](const Matrix3& m) {
         return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
                m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     };
     double expected = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-        UdFilter::Matrix3 m = s;
+        Matrix3 m = s;
         for (std::size_t i = 0; i < 3; ++i) m[i][k] = n[i];
         expected += n[k] * det(m) / det(s);
     }

@@ -221,6 +221,26 @@ TEST(Identification, AVibrationMeasuredAtHalfTheSampleRateIsRefusedWhateverTheKe
     }
 }
 
+/// What is free over the longest window of the level, and planned, is taken; short windows at the
+/// beginning of a dwell would show levels between 0.4 and 2 times the right one.
+TEST(Identification, AFrequencyBesideAForbiddenOneIsTaken) {
+    for (const double hz : {60.2, 20.2, 39.5, 40.5, 100.2, 500.2, 19.6, 60.4}) {
+        for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+            Settings settings;
+            settings.frequency_hz = hz;
+            Identification identification(settings);
+            RigSimulator rig(seed);
+            SimulatedDwell plan;
+            plan.frequency_hz = hz;
+            plan.duration_s = 30;
+            plan.lost_probability = seed % 2 == 0 ? 0.005 : 0;
+            const DwellSummary summary = rig.dwell(identification, plan);
+            EXPECT_FALSE(summary.left_out) << hz << " Hz, seed " << seed << ": " << summary.reason;
+            EXPECT_NEAR(summary.kappa, 19, 0.19) << hz << " Hz, seed " << seed;
+        }
+    }
+}
+
 TEST(Identification, AVibrationThatIsNotAtItsFrequencyIsReported) {
     // GIVEN a vibration of 6 g that is 3 Hz off what the key says, and one at it
     const auto reason = [](double hz, double amplitude_g) -> std::string {

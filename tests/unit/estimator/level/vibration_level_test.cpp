@@ -151,6 +151,37 @@ TEST(VibrationLevel, AboutHalfTheSampleRateALineIsWhatItMakesOfTheSamples) {
     }
 }
 
+/// What is free over 10 s lies beside a multiple of half the sample rate for the windows of 2 s:
+/// from the shortest one on that is long enough the level is steady.
+TEST(VibrationLevel, IsSteadyFromTheShortestWindowOnBesideWhatIsForbidden) {
+    for (const double frequency : {60.2, 60.3, 20.2, 39.5, 40.5, 100.2, 500.2, 19.6, 60.4, 15.0}) {
+        const double shortest_s = VibrationLevel::shortest_window_s(frequency, kLevelPeriod_s);
+        EXPECT_EQ(shortest_s > 2, frequency != 15) << frequency;
+        EXPECT_LE(shortest_s, 10) << frequency;
+        EXPECT_FALSE(VibrationLevel::excluded(frequency, kLevelPeriod_s, 10)) << frequency;
+        const int first = static_cast<int>(std::ceil(std::max(2.0, shortest_s) / kLevelPeriod_s));
+        for (int seed = 1; seed <= 5; ++seed) {
+            std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+            const Signal signal{.frequency = frequency, .phase = 1.3 * seed, .phase2 = 0.7 * seed};
+            VibrationLevel level(10, signal.noise, frequency + 0.01 * (seed - 3));
+            level.begin(kLevelPeriod_s);
+            double least = 1e9, largest = 0;
+            for (int i = 0; i < 1200; ++i) {
+                if (i == first) level.prime();
+                const double value = signal.at(i * kLevelPeriod_s, random);
+                i < first ? level.add_first(value) : level.add(value);
+                if (i < first) continue;
+                least = std::min(least, level.kappa());
+                largest = std::max(largest, level.kappa());
+            }
+            EXPECT_LT(largest / least, 1 + 2 * error_bound(signal, first))
+                << frequency << " Hz, seed " << seed;
+            EXPECT_LT(largest / least, 1.1) << "the dwell would be rejected, " << frequency;
+        }
+    }
+    EXPECT_GT(VibrationLevel::shortest_window_s(60.1, kLevelPeriod_s), 10) << "refused";
+}
+
 TEST(VibrationLevel, GravityCalibratesTheGain) {
     std::mt19937_64 random(21);
     Signal signal;

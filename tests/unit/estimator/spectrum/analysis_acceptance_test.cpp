@@ -197,10 +197,11 @@ TEST(SpectrumAcceptance, SharesSeenWithTheGainDeclaredFollowFromItsUncertainty) 
     }
 }
 
-/// A small elastic part, seen by the flatness test.
-unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_scatter,
-                   unsigned campaigns) {
-    unsigned alarms = 0;
+/// Surveys with a gain that differs from frequency to frequency: how often `count` says so.
+template <class Count>
+unsigned counted(const Truth& truth, const Settings& settings, double gain_scatter,
+                 unsigned campaigns, Form form, Count count) {
+    unsigned sum = 0;
     for (unsigned seed = 1; seed <= campaigns; ++seed) {
         auto plan = survey();
         std::mt19937_64 random(1000 + seed);
@@ -211,9 +212,16 @@ unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_sca
             if (!gains.contains(dwell.hz)) gains[dwell.hz] = 1 + gain_scatter * normal(random);
             dwell.gain = gains[dwell.hz];
         }
-        alarms += campaign(settings, truth, plan, seed, true, Form::flat).flat.alarm ? 1U : 0U;
+        sum += count(campaign(settings, truth, plan, seed, true, form));
     }
-    return alarms;
+    return sum;
+}
+
+/// A small elastic part, seen by the flatness test.
+unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_scatter,
+                   unsigned campaigns) {
+    return counted(truth, settings, gain_scatter, campaigns, Form::flat,
+                   [](const Analysis& found) { return found.flat.alarm ? 1U : 0U; });
 }
 
 TEST(SpectrumAcceptance, GainScatterThatIsNotDeclaredAlarmsInAQuarterToSixInTen) {
@@ -226,6 +234,18 @@ TEST(SpectrumAcceptance, GainScatterThatIsNotDeclaredAlarmsInAQuarterToSixInTen)
 TEST(SpectrumAcceptance, GainScatterThatIsDeclaredRaisesNoAlarm) {
     constexpr unsigned kCampaigns = 20;
     EXPECT_LE(alarms_of({}, gain_declared(), 0.005, kCampaigns), at_most(kCampaigns, 1.0 / 30));
+}
+/// As large as declared, it is no resonance: odds of e^4 come by chance once in e^4 gyros at most.
+TEST(SpectrumAcceptance, GainScatterThatIsDeclaredIsNoResonance) {
+    constexpr unsigned kCampaigns = 20;
+    Settings settings = gain_declared();
+    settings.uncertainty.gain_between_frequencies.u = 0.02;
+    const unsigned named =
+        counted({}, settings, 0.02, kCampaigns, Form::automatic, [](const Analysis& found) {
+            return static_cast<unsigned>(std::ranges::count_if(found.gyros, &Mixture::named));
+        });
+    std::printf("%u of %u gyros with a resonance\n", named, 3 * kCampaigns);
+    EXPECT_LE(named, at_most(3 * kCampaigns, std::exp(-4)));
 }
 TEST(SpectrumAcceptance, AShareOfTwoPercentIsSeenWithTheGainDeclared) {
     constexpr unsigned kCampaigns = 20;

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <iostream>
@@ -242,6 +244,90 @@ TEST(Campaigns, ADwellThatWasCutShortChangesNothingForTheOthers) {
         for (std::size_t i = 0; i < kParameters; ++i)
             EXPECT_NEAR(with.coefficients[i].u / whole.coefficients[i].u, 1, 0.1) << i;
     }
+}
+
+/// Of angles that do not move in step: 0.12 arcsec is the rms of an encoder's lock-in over 100 s.
+double sync_of_noise(Random& random) {
+    double square = 0;
+    for (int k = 0; k < 3; ++k)
+        square += 0.12 * 0.12 * (std::exponential_distribution<double>()(random) - 1);
+    return std::sqrt(std::max(0.0, square));
+}
+
+const Reason* reason_of(const Assessment& a, const std::string& code) {
+    for (const Reason& reason : a.verdict.reasons)
+        if (reason.code == code) return &reason;
+    return nullptr;
+}
+
+TEST(Campaigns, ALineThatIsLeftAtRestIsNoMotionInStep) {
+    Settings settings;
+    for (const double left_g : {0.015, 0.03, 0.06, 0.13, 0.3, 0.5}) {
+        const Rows clean = theory_rows(settings, balanced_with_rest(kFirst));
+        for (int seed = 1; seed <= 20; ++seed) {
+            SCOPED_TRACE(std::to_string(left_g) + " g, seed " + std::to_string(seed));
+            Random random(static_cast<std::uint64_t>(seed));
+            Rows rows = clean;
+            for (DwellRow& row : rows) {
+                row.sync_arcsec = sync_of_noise(random);
+                if (row.frequency_hz > 0) continue;
+                row.frequency_hz = 15;
+                row.vibration.kappa = 1 + left_g * left_g / 2;
+            }
+            add_noise(rows, random);
+            EXPECT_EQ(
+                reason_of(assess(settings, estimator::testing::result_of(rows)), "sync motion"),
+                nullptr);
+            // THEN motion of the platform that is there is still seen, in a dwell of either level
+            if (seed > 3) continue;
+            for (const double kappa : {10.0, 1.0}) {
+                Rows moved = rows;
+                const auto one = std::ranges::find_if(moved, [=](const DwellRow& row) {
+                    return kappa > 1 ? row.vibration.kappa > kappa : row.vibration.kappa < 2;
+                });
+                one->sync_arcsec = 20;
+                const Assessment a =
+                    assess(settings, estimator::testing::result_of(std::move(moved)));
+                const Reason* reason = reason_of(a, "sync motion");
+                ASSERT_NE(reason, nullptr) << kappa;
+                EXPECT_EQ(reason->level, Level::not_valid) << kappa;
+            }
+        }
+    }
+}
+
+TEST(Campaigns, HowLargeTheCoefficientsAreIsNoLackOfFit) {
+    Settings settings;
+    constexpr std::array<double, 3> kBias{40, -35, 30};  ///< deg/h, of a prior of 10
+    const Rows small = theory_rows(settings, balanced(kFirst, kSecond));
+    Rows large = small;
+    for (DwellRow& row : large)
+        for (std::size_t j = 0; j < 3; ++j) row.rate[j] += kBias[j] - kTable2[kGroups * j];
+    Eigen::VectorXd prior(kParameters);
+    for (Eigen::Index i = 0; i < prior.size(); ++i) prior[i] = i < 12 ? 0.01 : 1;
+    const auto chi_square = [&](const Rows& rows) {
+        return NullFit(dwell_table(rows), Eigen::MatrixXd(3 * rows.size(), 0), prior).chi_square();
+    };
+    double mean = 0;
+    constexpr int kOfEach = 20;
+    for (int seed = 1; seed <= kOfEach; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        const auto with_noise = [seed](Rows rows) {
+            Random random(static_cast<std::uint64_t>(seed));
+            add_noise(rows, random);
+            return rows;
+        };
+        // The prior's part would be 16 + 12 + 9.
+        EXPECT_NEAR(chi_square(with_noise(large)), chi_square(with_noise(small)), 0.01);
+        const auto assessed = [&](const Rows& rows) {
+            return assess(settings, estimator::testing::result_of(with_noise(rows)));
+        };
+        const Assessment a = assessed(large);
+        EXPECT_EQ(a.degrees, 54);
+        EXPECT_EQ(a.verdict.level, assessed(small).verdict.level) << a.verdict.sentence;
+        mean += a.chi_square / kOfEach;
+    }
+    EXPECT_NEAR(mean, 54, 3.29 * std::sqrt(2 * 54.0 / kOfEach));
 }
 
 TEST(Campaigns, OfTheTwoStepRouteNothingIsTestedAndNothingCalledValid) {
