@@ -3,12 +3,11 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <array>
-#include <cstdio>
 #include <initializer_list>
+#include <iostream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace vibrig::proto {
 
@@ -20,56 +19,36 @@ struct Exit {
 
 namespace command_tree {
 
-[[nodiscard]] inline std::string json_text(std::string_view text) {
-    std::string out = "\"";
-    for (const char c : text) {
-        if (c == '"' || c == '\\') {
-            out += '\\';
-            out += c;
-        } else if (static_cast<unsigned char>(c) < 0x20) {
-            std::array<char, 8> code{};
-            std::snprintf(code.data(), code.size(), "\\u%04x", static_cast<unsigned>(c));
-            out += code.data();
-        } else {
-            out += c;
-        }
-    }
-    return out + '"';
-}
+using Json = nlohmann::ordered_json;
 
-[[nodiscard]] inline std::string list(const std::vector<std::string>& words) {
-    std::string out;
-    for (const auto& word : words) out += (out.empty() ? "" : ",") + json_text(word);
-    return '[' + out + ']';
-}
-
-[[nodiscard]] inline std::string option(const CLI::Option& o) {
-    std::vector<std::string> names;
+[[nodiscard]] inline Json option(const CLI::Option& o) {
+    Json names = Json::array();
     for (const auto& name : o.get_snames()) names.push_back('-' + name);
     for (const auto& name : o.get_lnames()) names.push_back("--" + name);
     const bool flag = o.get_items_expected_max() == 0;
-    return "{\"names\":" + list(names) + ",\"positional\":" + json_text(o.get_name(true, false)) +
-           ",\"text\":" + json_text(o.get_description()) +
-           ",\"type\":" + json_text(flag ? "" : o.get_type_name()) +
-           ",\"default\":" + json_text(o.get_default_str()) +
-           ",\"environment\":" + json_text(o.get_envname()) +
-           ",\"required\":" + (o.get_required() ? "true" : "false") +
-           ",\"many\":" + (o.get_items_expected_max() > 1 ? "true" : "false") + '}';
+    return {{"names", names},
+            {"positional", o.get_name(true, false)},
+            {"text", o.get_description()},
+            {"type", flag ? std::string() : o.get_type_name()},
+            {"default", o.get_default_str()},
+            {"environment", o.get_envname()},
+            {"required", o.get_required()},
+            {"many", o.get_items_expected_max() > 1}};
 }
 
-/// Without the closing bracket: the program's own has more to say.
-[[nodiscard]] inline std::string command(const CLI::App& app) {
-    std::string options, commands;
+[[nodiscard]] inline Json command(const CLI::App& app) {
+    Json options = Json::array(), commands = Json::array();
     for (const CLI::Option* o : app.get_options()) {
         // No group: not shown in --help either.
-        if (!o->get_group().empty()) options += (options.empty() ? "" : ",") + option(*o);
+        if (!o->get_group().empty()) options.push_back(option(*o));
     }
     for (const CLI::App* c : app.get_subcommands([](const CLI::App*) { return true; }))
-        commands += (commands.empty() ? "" : ",") + command(*c) + '}';
-    return "{\"name\":" + json_text(app.get_name()) +
-           ",\"text\":" + json_text(app.get_description()) +
-           ",\"footer\":" + json_text(app.get_footer()) + ",\"options\":[" + options +
-           "],\"commands\":[" + commands + "]";
+        commands.push_back(command(*c));
+    return {{"name", app.get_name()},
+            {"text", app.get_description()},
+            {"footer", app.get_footer()},
+            {"options", options},
+            {"commands", commands}};
 }
 
 }  // namespace command_tree
@@ -80,15 +59,20 @@ namespace command_tree {
     return argc == 2 && std::string_view(argv[1]) == "--command-tree";
 }
 
+/// Exit status of a program that only prints: nobody may take half of it, or nothing, for all.
+[[nodiscard]] inline int printed(const CLI::App& app) {
+    if (std::cout.flush()) return 0;
+    std::cerr << app.get_name() << ": standard output: cannot be written\n";
+    return 2;
+}
+
 /// Options, commands and exit codes as one JSON object, from CLI11's own tree.
 [[nodiscard]] inline std::string command_tree_json(const CLI::App& app,
                                                    std::initializer_list<Exit> exits) {
-    std::string codes;
+    auto tree = command_tree::command(app);
     for (const Exit& exit : exits)
-        codes += (codes.empty() ? "" : ",") + std::string("{\"code\":") +
-                 std::to_string(exit.code) +
-                 ",\"meaning\":" + command_tree::json_text(exit.meaning) + '}';
-    return command_tree::command(app) + ",\"exits\":[" + codes + "]}\n";
+        tree["exits"].push_back({{"code", exit.code}, {"meaning", exit.meaning}});
+    return tree.dump() + '\n';
 }
 
 }  // namespace vibrig::proto

@@ -32,7 +32,6 @@ class DbcScanner {
     DbcScanner(std::string_view text, std::string file);
     [[nodiscard]] const Token& peek() const noexcept { return ahead_; }
     Token next();
-    [[nodiscard]] const std::string& file() const noexcept { return file_; }
 
     /// "found <token>, expected <expected>" at the token.
     [[noreturn]] void fail(const Token& found, const std::string& expected) const;

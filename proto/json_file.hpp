@@ -10,6 +10,25 @@
 
 namespace vibrig::proto {
 
+/// The JSON of a file's text. Throws std::runtime_error, FILE: REFUSAL; line and column that are
+/// none.
+template <class Json = nlohmann::json>
+[[nodiscard]] Json parse_json(const std::string& text, const std::string& file,
+                              const std::string& refusal) {
+    try {
+        return Json::parse(text);
+    } catch (const nlohmann::json::parse_error& error) {
+        const std::string before = text.substr(0, error.byte > 0 ? error.byte - 1 : 0);
+        const auto line = std::count(before.begin(), before.end(), '\n') + 1;
+        const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;
+        throw std::runtime_error(file + ": " + refusal + "; line " + std::to_string(line) +
+                                 ", column " + std::to_string(column) +
+                                 (before.size() >= text.size() ? ": the text ends" : ""));
+    } catch (const nlohmann::json::out_of_range&) {
+        throw std::runtime_error(file + ": " + refusal + "; a number is beyond all that are known");
+    }
+}
+
 /// The JSON in a file. Throws std::runtime_error that names it: it cannot be read, or has none;
 /// then with the line and column that are none.
 [[nodiscard]] inline nlohmann::json read_json(const std::string& path) {
@@ -21,16 +40,7 @@ namespace vibrig::proto {
         throw std::runtime_error(path + ": cannot be read, expected a JSON file (" + error.what() +
                                  ")");
     }
-    try {
-        return nlohmann::json::parse(text);
-    } catch (const nlohmann::json::parse_error& error) {
-        const std::string before = text.substr(0, error.byte > 0 ? error.byte - 1 : 0);
-        const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-        const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;
-        throw std::runtime_error(path + ": found no JSON, expected it; line " +
-                                 std::to_string(line) + ", column " + std::to_string(column) +
-                                 (before.size() >= text.size() ? ": the text ends" : ""));
-    }
+    return parse_json(text, path, "found no JSON, expected it");
 }
 
 }  // namespace vibrig::proto

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/edits.hpp"
 #include "proto/line_reader.hpp"
 #include "proto/text.hpp"
 
@@ -57,17 +58,21 @@ std::string quoted(std::string_view text) {
     return text.empty() ? "nothing" : "'" + printable(text) + "'";
 }
 
-std::string_view trim(std::string_view text) noexcept {
-    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-    while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-    return text;
-}
+std::string_view trim(std::string_view text) noexcept { return trimmed(text, " \t"); }
 
 /// Names of columns, whatever their case.
 bool same(std::string_view name, std::string_view found) {
     return std::equal(name.begin(), name.end(), found.begin(), found.end(), [](char a, char b) {
         return a == (b >= 'A' && b <= 'Z' ? static_cast<char>(b - 'A' + 'a') : b);
     });
+}
+
+constexpr std::size_t kMisspelt = 2;  ///< edits
+
+bool misspelt_role(std::string_view word) {
+    std::string lower(word);
+    for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return edits(lower, "verify") <= kMisspelt || edits(lower, "identify") <= kMisspelt;
 }
 
 std::string text_of(double value) {
@@ -169,12 +174,12 @@ class RecordingReader::Rows {
     void split(std::string_view line) {
         fields_.clear();
         for (bool more = true; more;) {
-            std::string_view rest = trimmed(line);
+            std::string_view rest = bare(line);
             std::string_view field;
             if (rest.starts_with('"')) {
                 const std::size_t end = closing_quote(rest);
                 field = rest.substr(1, end - 1);
-                rest = trimmed(rest.substr(end + 1));
+                rest = bare(rest.substr(end + 1));
                 if (!rest.empty() && rest.front() != separator_) {
                     fail("", "found " + quoted(rest) + " after a closing quote, expected '" +
                                  printable({&separator_, 1}) + "'");
@@ -203,11 +208,8 @@ class RecordingReader::Rows {
     }
 
     /// Without blanks at its ends; a tab that separates is none.
-    [[nodiscard]] std::string_view trimmed(std::string_view text) const noexcept {
-        if (separator_ != '\t') return trim(text);
-        while (text.starts_with(' ')) text.remove_prefix(1);
-        while (text.ends_with(' ')) text.remove_suffix(1);
-        return text;
+    [[nodiscard]] std::string_view bare(std::string_view text) const noexcept {
+        return trimmed(text, separator_ == '\t' ? " " : " \t");
     }
 
     /// Comma, semicolon or tab, by the header, which has one of them only.
@@ -251,6 +253,9 @@ class RecordingReader::Rows {
             fail("", "found the header " + quoted(trim(without_byte_order_mark(*line))) +
                          ", expected also the column(s) " + missing);
         }
+        // Of no profile there is no level: the column is somebody else's.
+        if (!seen.at(kProfile)) std::ranges::replace(roles_, kLevel, kNone);
+        own_role_ = seen.at(kFrequency) || seen.at(kProfile);
     }
 
     RecordingRow row(std::string_view line) {
@@ -306,15 +311,27 @@ class RecordingReader::Rows {
         return row;
     }
 
-    bool held_out(std::string_view field) const {
-        if (same("verify", field)) return true;
-        if (!field.empty() && !same("identify", field))
-            fail(kColumns.at(kRole).name,
-                 "found " + quoted(field) + ", expected \"identify\" or \"verify\"");
-        return false;
+    /// A column of this name may be anybody's, of operators say: it is this one where the file says
+    /// of its vibration otherwise, too, or where one of its words is known.
+    bool held_out(std::string_view field) {
+        if (field.empty() || (other_role_ && field == other_role_->second)) return false;
+        const bool verify = same("verify", field);
+        if (!verify && !same("identify", field)) {
+            if (own_role_ || misspelt_role(field)) refuse_role(lines_.line(), field);
+            if (!other_role_) other_role_.emplace(lines_.line(), field);
+            return false;
+        }
+        if (other_role_) refuse_role(other_role_->first, other_role_->second);
+        own_role_ = true;
+        return verify;
+    }
+    [[noreturn]] void refuse_role(std::size_t line, std::string_view field) const {
+        throw RecordingError(path_, line, std::string(kColumns.at(kRole).name),
+                             "found " + quoted(field) + ", expected \"identify\" or \"verify\"");
     }
 
     double frequency(std::string_view field) const {
+        if (field.empty()) return 0;
         const double hz = real(kFrequency, field);
         if (hz < 0)
             fail(kColumns.at(kFrequency).name, "found " + quoted(field) + ", expected 0 or above");
@@ -413,6 +430,8 @@ class RecordingReader::Rows {
     char separator_ = ',';
     std::vector<std::string_view> fields_;
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
+    bool own_role_ = false;           ///< the column `role` says which dwells are held out
+    std::optional<std::pair<std::size_t, std::string>> other_role_;  ///< first of a word unknown
     std::pair<int, int> dwell_;
     std::optional<double> last_time_;  ///< of the dwell in force
     bool held_out_ = false;            ///< the dwell of the newest row
@@ -421,7 +440,7 @@ class RecordingReader::Rows {
 
 RecordingError::RecordingError(const std::string& file, std::size_t line, const std::string& column,
                                const std::string& what)
-    : std::runtime_error(locate(file, line, column, what)), line_(line), column_(column) {}
+    : std::runtime_error(locate(file, line, column, what)) {}
 
 RecordingReader::RecordingReader(const std::string& path) : rows_(std::make_unique<Rows>(path)) {}
 RecordingReader::~RecordingReader() = default;

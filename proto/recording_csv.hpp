@@ -33,23 +33,19 @@ class RecordingError : public std::runtime_error {
     /// Line 0: the file as a whole. Empty column: the line as a whole.
     RecordingError(const std::string& file, std::size_t line, const std::string& column,
                    const std::string& what);
-    [[nodiscard]] std::size_t line() const noexcept { return line_; }
-    [[nodiscard]] const std::string& column() const noexcept { return column_; }
-
-  private:
-    std::size_t line_;
-    std::string column_;
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
 /// ax_g, ay_g, az_g, and if it likes frequency_hz, profile, level_db and role, in any order and any
-/// case, row by row in bounded memory; other columns are ignored. The role "verify" holds a dwell
-/// out, any other does not. A profile is a name or a number; 0 or
-/// nothing: the dwell was at rest or under a sine. Fields are separated by commas, or by semicolons
-/// or tabs as the header says; then numbers may have decimal commas. Lines of comment (#) may come
-/// before the header. A (run, position) pair that comes back after another one begins a new dwell.
-/// One that begins with the times and samples of another is a copy of it, and refused. Throws
-/// RecordingError.
+/// case, row by row in bounded memory; other columns are ignored, and so are level_db without
+/// profile, and role where there is neither frequency_hz nor profile and none of its words is
+/// "verify" or "identify", or like them. The role "verify" holds a dwell out, "identify" or nothing
+/// does not. A profile is a name or a number; 0 or nothing: the dwell was at rest or under a sine,
+/// and at rest where frequency_hz is 0 or nothing, too. Fields are separated by commas, or by
+/// semicolons or tabs as the header says; then numbers may have decimal commas. Lines of comment
+/// (#) may come before the header. A (run, position) pair that comes back after another one begins
+/// a new dwell. One that begins with the times and samples of another is a copy of it, and refused.
+/// Throws RecordingError.
 class RecordingReader {
   public:
     /// Reads the header.

@@ -103,11 +103,10 @@ std::string utf8_from_latin1(std::string_view text) {
     return out;
 }
 
-std::string_view trimmed(std::string_view field) noexcept {
-    constexpr std::string_view kAround = " \t\r\"";
-    const std::size_t first = field.find_first_not_of(kAround);
+std::string_view trimmed(std::string_view field, std::string_view around) noexcept {
+    const std::size_t first = field.find_first_not_of(around);
     if (first == std::string_view::npos) return {};
-    return field.substr(first, field.find_last_not_of(kAround) - first + 1);
+    return field.substr(first, field.find_last_not_of(around) - first + 1);
 }
 
 std::string read_whole_file(const std::string& path, std::size_t limit) {

@@ -21,8 +21,9 @@ inline constexpr std::size_t kQuotedLength = 40, kLongestLine = 1000;
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;
 [[nodiscard]] std::string utf8_from_latin1(std::string_view text);
 
-/// Without the blanks and quotes around a field of a CSV file.
-[[nodiscard]] std::string_view trimmed(std::string_view field) noexcept;
+/// Without what of `around` is at its ends: blanks and quotes, as about a field of a CSV file.
+[[nodiscard]] std::string_view trimmed(std::string_view field,
+                                       std::string_view around = " \t\r\"") noexcept;
 
 /// True if all of the text is one number that the type holds, without sign '+' or spaces.
 template <typename Number>

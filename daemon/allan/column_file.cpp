@@ -38,12 +38,7 @@ bool parse(std::string_view field, double& value) {
     return proto::read_number(field, value) && std::isfinite(value);
 }
 
-std::string shown(std::string_view text) {
-    std::string out(text.substr(0, 40));
-    std::replace_if(
-        out.begin(), out.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, '?');
-    return "\"" + out + (text.size() > 40 ? "..." : "") + "\"";
-}
+std::string shown(std::string_view text) { return "\"" + proto::printable(text, 40) + "\""; }
 
 class Parser {
   public:
@@ -169,7 +164,7 @@ class Parser {
     static std::string joined(const std::vector<std::string>& fields) {
         std::string all;
         for (const std::string& f : fields) {
-            all += (all.empty() ? "" : ", ") + f;
+            all += (all.empty() ? "" : ", ") + proto::printable(f);
         }
         return all;
     }

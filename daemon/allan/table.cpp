@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 
 #include "daemon/allan/analysis.hpp"
@@ -10,18 +11,10 @@ namespace {
 constexpr double kShownWeight = 0.05;
 
 const char* noise_name(allan::Alpha alpha) {
-    switch (alpha) {
-        case 2:
-            return "white PM";
-        case 1:
-            return "flicker PM";
-        case 0:
-            return "white FM";
-        case -1:
-            return "flicker FM";
-        default:
-            return "random walk";
-    }
+    constexpr std::array<const char*, 4> kFromFlicker{"flicker FM", "white FM", "flicker PM",
+                                                      "white PM"};
+    return alpha >= -1 && alpha <= 2 ? kFromFlicker[static_cast<std::size_t>(alpha + 1)]
+                                     : "random walk";
 }
 
 std::string fit_table(const allan::Fit& fit) {

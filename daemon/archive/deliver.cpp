@@ -15,7 +15,6 @@
 
 #include "daemon/archive/manifest.hpp"
 #include "daemon/record/campaign_file.hpp"
-#include "daemon/record/digest.hpp"
 
 namespace vibrig::archive {
 

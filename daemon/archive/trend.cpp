@@ -28,33 +28,25 @@ double level_of_each(double level, std::size_t tests) {
     return tests == 0 ? level : 1 - std::pow(1 - level, 1 / static_cast<double>(tests));
 }
 
-/// What the values of one group tell, weighted by 1 / u^2.
-struct GroupSums {
+/// Of values, weighted by one over their variances.
+struct WeightedMean {
     double weight = 0, weight_squared = 0, mean = 0;
-    std::size_t count = 0;
-};
 
-std::map<std::size_t, GroupSums> sum_up(const std::vector<double>& value,
-                                        const std::vector<double>& u,
-                                        const std::vector<std::size_t>& group) {
-    std::map<std::size_t, GroupSums> groups;
-    for (std::size_t i = 0; i < value.size(); ++i) {
-        GroupSums& of = groups[group[i]];
-        const double w = 1 / squared(u[i]);
-        of.weight += w;
-        of.weight_squared += squared(w);
-        of.mean += w * (value[i] - of.mean) / of.weight;
-        ++of.count;
+    void add(double value, double variance) {
+        const double w = 1 / variance;
+        weight += w;
+        weight_squared += squared(w);
+        mean += w * (value - mean) / weight;
     }
-    return groups;
-}
+};
 
 }  // namespace
 
 Variance analyse_variance(const std::vector<double>& value, const std::vector<double>& u,
                           const std::vector<std::size_t>& group) {
     Variance out;
-    const auto groups = sum_up(value, u, group);
+    std::map<std::size_t, WeightedMean> groups;
+    for (std::size_t i = 0; i < value.size(); ++i) groups[group[i]].add(value[i], squared(u[i]));
     double q_within = 0, weight = 0, within_room = 0;
     for (std::size_t i = 0; i < value.size(); ++i)
         q_within += squared((value[i] - groups.at(group[i]).mean) / u[i]);
@@ -110,29 +102,21 @@ Variance analyse_variance(const std::vector<double>& value, const std::vector<do
 std::optional<Judgement> judge(double value, double u, const std::vector<double>& before,
                                const std::vector<double>& before_u) {
     if (before.size() < kFewestBefore) return {};
-    double weight = 0, weight_squared = 0, mean = 0, q = 0;
-    for (std::size_t i = 0; i < before.size(); ++i) {
-        const double w = 1 / squared(before_u[i]);
-        weight += w;
-        weight_squared += squared(w);
-        mean += w * (before[i] - mean) / weight;
-    }
-    for (std::size_t i = 0; i < before.size(); ++i) q += squared((before[i] - mean) / before_u[i]);
+    WeightedMean own, with;
+    for (std::size_t i = 0; i < before.size(); ++i) own.add(before[i], squared(before_u[i]));
+    double q = 0;
+    for (std::size_t i = 0; i < before.size(); ++i)
+        q += squared((before[i] - own.mean) / before_u[i]);
     Judgement out;
     out.dof = static_cast<double>(before.size() - 1);
-    const double instability =
-        std::max(0.0, (q - out.dof) / (weight - weight_squared / weight));  // its square
+    const double instability = std::max(
+        0.0, (q - out.dof) / (own.weight - own.weight_squared / own.weight));  // its square
     // With it the weights are others; of equal uncertainties the mean stays.
-    double total = 0;
-    mean = 0;
-    for (std::size_t i = 0; i < before.size(); ++i) {
-        const double w = 1 / (squared(before_u[i]) + instability);
-        total += w;
-        mean += w * (before[i] - mean) / total;
-    }
-    out.expected = mean;
-    out.sigma = std::sqrt(squared(u) + instability + 1 / total);
-    out.t = (value - mean) / out.sigma;
+    for (std::size_t i = 0; i < before.size(); ++i)
+        with.add(before[i], squared(before_u[i]) + instability);
+    out.expected = with.mean;
+    out.sigma = std::sqrt(squared(u) + instability + 1 / with.weight);
+    out.t = (value - with.mean) / out.sigma;
     out.p = two_sided(out.t, out.dof);
     return out;
 }

@@ -1,58 +1,22 @@
+#include <array>
+
 #include "daemon/domain/campaign_state.hpp"
 #include "daemon/domain/events.hpp"
+#include "proto/word_of.hpp"
 
 namespace vibrig {
 
 const char* name_of(CampaignState state) noexcept {
-    switch (state) {
-        case CampaignState::idle:
-            return "idle";
-        case CampaignState::armed:
-            return "armed";
-        case CampaignState::waiting:
-            return "waiting";
-        case CampaignState::slewing:
-            return "slewing";
-        case CampaignState::ramping:
-            return "ramping";
-        case CampaignState::settling:
-            return "settling";
-        case CampaignState::recording:
-            return "recording";
-        case CampaignState::resting:
-            return "resting";
-        case CampaignState::paused:
-            return "paused";
-        case CampaignState::finished:
-            return "finished";
-        case CampaignState::aborted:
-            return "aborted";
-        case CampaignState::tripped:
-            return "tripped";
-        case CampaignState::zeroing:
-            return "zeroing";
-        case CampaignState::levelling:
-            return "levelling";
-        case CampaignState::checking:
-            return "checking";
-        case CampaignState::commissioning:
-            return "commissioning";
-    }
-    return "unknown";
+    static constexpr std::array kWords{"idle",    "armed",     "waiting",   "slewing",
+                                       "ramping", "settling",  "recording", "resting",
+                                       "paused",  "finished",  "aborted",   "tripped",
+                                       "zeroing", "levelling", "checking",  "commissioning"};
+    return proto::word_of(kWords, state, "unknown");
 }
 
 const char* name_of(Severity severity) noexcept {
-    switch (severity) {
-        case Severity::info:
-            return "info";
-        case Severity::warning:
-            return "warning";
-        case Severity::alarm:
-            return "alarm";
-        case Severity::trip:
-            return "trip";
-    }
-    return "unknown";
+    static constexpr std::array kWords{"info", "warning", "alarm", "trip"};
+    return proto::word_of(kWords, severity, "unknown");
 }
 
 }  // namespace vibrig

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "daemon/serve/status_message.hpp"
 #include "daemon/status/values.hpp"
 #include "proto/sparkplug.pb.h"
 #include "proto/text.hpp"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "daemon/configuration/mqtt_settings.hpp"
 #include "daemon/domain/events.hpp"

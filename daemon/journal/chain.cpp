@@ -39,17 +39,12 @@ void Chain::append(Database& database, std::string_view table, std::int64_t row)
                  {last_.entry, table, row, Blob{digest}, Blob{last_.hash}});
 }
 
-std::int64_t Chain::take_over(Database& database) {
-    std::int64_t rows = 0;
+void Chain::take_over(Database& database) {
     for (const std::string_view table : kChained) {
         if (table == "origin") continue;
         const std::string ask = fmt::format("SELECT rowid FROM {} ORDER BY rowid", table);
-        for (const Row& row : database.ask(ask.c_str())) {
-            append(database, table, row.numbers.at(0));
-            ++rows;
-        }
+        for (const Row& row : database.ask(ask.c_str())) append(database, table, row.numbers.at(0));
     }
-    return rows;
 }
 
 void Verification::name(std::string what) {

@@ -22,8 +22,8 @@ class Chain {
     explicit Chain(Link last) : last_(std::move(last)) {}
     /// A row as it is now: a new one, or one that was changed.
     void append(Database& database, std::string_view table, std::int64_t row);
-    /// Every row of every table but `origin`, as one found them. Returns how many.
-    std::int64_t take_over(Database& database);
+    /// Every row of every table but `origin`, as one found them.
+    void take_over(Database& database);
     [[nodiscard]] const Link& last() const noexcept { return last_; }
     void rewind(Link last) { last_ = std::move(last); }  ///< after a rollback
 

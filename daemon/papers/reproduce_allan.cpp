@@ -1,7 +1,7 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -109,11 +109,8 @@ struct Statistics {
     std::vector<double> values;
     void add(double value) { values.push_back(value); }
     [[nodiscard]] double mean() const {
-        double sum = 0;
-        for (const double v : values) {
-            sum += v;
-        }
-        return sum / static_cast<double>(values.size());
+        return std::accumulate(values.begin(), values.end(), 0.0) /
+               static_cast<double>(values.size());
     }
     [[nodiscard]] double deviation() const {
         double sum = 0;

@@ -329,7 +329,14 @@ plot::Chart allocation_chart() {
     return chart;
 }
 
-Reproduction all(bool charts) {
+}  // namespace
+
+}  // namespace vibrig::tool::dplan
+
+namespace vibrig::tool {
+
+Reproduction reproduce_dplan(const ReproduceOptions& options) {
+    using namespace dplan;
     Reproduction table{"dplan", "D-optimal test plans"};
     add_ranks(table);
     add_allocation(table);
@@ -337,9 +344,8 @@ Reproduction all(bool charts) {
     add_double_sphere_efficiencies(table);
     add_rig_optimum(table);
     add_position_table(table);
-    if (charts) {
+    if (!options.plot.empty())
         table.charts = {{"growth", growth_chart()}, {"allocation", allocation_chart()}};
-    }
     table.notes.emplace_back(
         "Li et al. 2017 state: one sphere does not identify all ten, two spheres (r > 1) do, the "
         "determinant is largest at a = 2 and grows with r. Their equations are lost: a is "
@@ -350,16 +356,6 @@ Reproduction all(bool charts) {
         "each on both");
     table.notes.emplace_back("the paper's identified gyro coefficients are not available");
     return table;
-}
-
-}  // namespace
-
-}  // namespace vibrig::tool::dplan
-
-namespace vibrig::tool {
-
-Reproduction reproduce_dplan(const ReproduceOptions& options) {
-    return dplan::all(!options.plot.empty());
 }
 
 }  // namespace vibrig::tool

@@ -1,12 +1,9 @@
+#include "daemon/papers/reproduce_tang2009.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 
-#include "daemon/papers/reproduce.hpp"
-#include "daemon/papers/reproduce_tang2009_plot.hpp"
-#include "daemon/papers/reproduce_tang2009_study.hpp"
-#include "daemon/papers/reproduce_tang2009_theory.hpp"
 #include "daemon/results/text_line.hpp"
 #include "estimator/allan/edf.hpp"
 #include "estimator/filter/parameters.hpp"

@@ -1,8 +1,7 @@
-#include "daemon/papers/reproduce_tang2009_study.hpp"
+#include "daemon/papers/reproduce_tang2009.hpp"
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <exception>
 #include <thread>
 

@@ -1,4 +1,4 @@
-#include "daemon/papers/reproduce_tang2009_theory.hpp"
+#include "daemon/papers/reproduce_tang2009.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,7 +1,5 @@
 #include <array>
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/papers/reproduce_zha2019_vehicle.hpp"
@@ -191,7 +189,14 @@ void add_noisy_reference(Reproduction& table, std::size_t seeds) {
     }
 }
 
-Reproduction reproduction(const ReproduceOptions& options) {
+}  // namespace
+
+}  // namespace vibrig::tool::zha2019
+
+namespace vibrig::tool {
+
+Reproduction reproduce_zha2019(const ReproduceOptions& options) {
+    using namespace zha2019;
     Reproduction table{"zha2019", "fast damping with an external velocity reference"};
     add_gains(table);
     add_settling(table);
@@ -227,10 +232,4 @@ Reproduction reproduction(const ReproduceOptions& options) {
     return table;
 }
 
-}  // namespace
-
-}  // namespace vibrig::tool::zha2019
-
-vibrig::tool::Reproduction vibrig::tool::reproduce_zha2019(const ReproduceOptions& options) {
-    return zha2019::reproduction(options);
-}
+}  // namespace vibrig::tool

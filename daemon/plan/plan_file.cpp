@@ -400,17 +400,6 @@ void refuse_random(const std::vector<PlannedRun>& runs) {
     }
 }
 
-std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
-    auto runs = read_plan(path, [transmission](auto) { return std::optional(transmission); });
-    refuse_random(runs);
-    for (const PlannedRun& run : runs) {
-        if (run.sweep_to_hz > 0)
-            refuse(run.profile_place, number(run.sweep_to_hz) + " Hz",
-                   "a sine that stands: sweeps are for vibrigd's campaigns");
-    }
-    return runs;
-}
-
 PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmission,
                         std::optional<double> rig_hz) {
     const std::string text = content_of(path);
@@ -429,6 +418,27 @@ PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmiss
 std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission,
                                   std::optional<double> rig_hz) {
     return read_plan_file(path, transmission, rig_hz).runs;
+}
+
+std::optional<PlanMount> read_plan_mount(const std::string& path) {
+    // What is wrong with the file its reader says.
+    const Json plan = Json::parse(content_of(path), nullptr, false);
+    if (!plan.is_object()) return {};
+    const auto ratio = [](const Json& of) -> std::optional<double> {
+        const auto found = of.find("transmission");
+        if (found == of.end() || !found->is_number() || !(found->get<double>() > 0)) return {};
+        return found->get<double>();
+    };
+    const Json survey = plan.value("survey", Json());
+    if (!survey.is_object()) {
+        const auto stated = ratio(plan);
+        return stated ? std::optional(PlanMount{*stated, 0}) : std::nullopt;
+    }
+    if (survey.value("mount", Json()) == "hard") return PlanMount{};
+    const Json lines = survey.value("frequencies", Json());
+    const Json first = lines.is_array() && !lines.empty() ? lines[0] : Json();
+    if (!first.is_object() || !ratio(first) || !first.value("hz", Json()).is_number()) return {};
+    return PlanMount{*ratio(first), first["hz"].get<double>()};
 }
 
 std::vector<std::array<double, 3>> read_positions(const std::string& path) {

@@ -56,8 +56,14 @@ struct PlanFile {
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
                                                 const TransmissionAt& transmission,
                                                 std::optional<double> rig_hz = std::nullopt);
-/// The same at every frequency; random vibration and sweeps are refused.
-[[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
+
+/// What stands between table and platform by the plan's own words.
+struct PlanMount {
+    double transmission = 1;  ///< 1 and more: hard
+    double at_hz = 0;         ///< 0: the configuration's
+};
+/// As `vibrig plan --json` says it; none: the file does not, as no CSV does.
+[[nodiscard]] std::optional<PlanMount> read_plan_mount(const std::string& path);
 
 /// Where a plan's rows are judged: a profile's levels in g are 0, as at rest. Throws PlanFileError.
 void refuse_random(const std::vector<PlannedRun>& runs);

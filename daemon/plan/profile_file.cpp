@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "daemon/plan/number_table.hpp"
 #include "proto/json_file.hpp"
 
 namespace vibrig::plan {
@@ -20,13 +21,10 @@ Breakpoints read_pairs(const nlohmann::json& root, const std::string& path, cons
     const auto found = root.find(key);
     if (found == root.end()) return out;
     const std::string place = path + key;
-    if (!found->is_array())
-        throw std::runtime_error(place + ": found " + found->dump() + ", expected [" + form +
-                                 ", ..]");
+    if (!found->is_array()) refuse(place, found->dump(), std::string("[") + form + ", ..]");
     for (const auto& one : *found) {
         if (!one.is_array() || one.size() != 2 || !one[0].is_number() || !one[1].is_number())
-            throw std::runtime_error(place + "[" + std::to_string(out.size()) + "]: found " +
-                                     one.dump() + ", expected " + form);
+            refuse(place + "[" + std::to_string(out.size()) + "]", one.dump(), form);
         out.emplace_back(one[0].get<double>(), one[1].get<double>());
     }
     return out;
@@ -36,15 +34,13 @@ void refuse_unknown(const nlohmann::json& root, const std::string& path) {
     constexpr std::array<const char*, 7> kKnown{"name",      "psd",   "cross", "sines",
                                                 "direction", "g_rms", "at"};
     if (root.contains("quadrature"))
-        throw std::runtime_error(
-            path +
-            ": quadrature: found cross-spectra with an imaginary part, expected real ones: "
-            "a campaign with one shaker does not excite what answers elliptic motion");
+        refuse(path + ": quadrature", "cross-spectra with an imaginary part",
+               "real ones: a campaign with one shaker does not excite what answers elliptic "
+               "motion");
     for (const auto& [key, value] : root.items()) {
-        if (std::find(kKnown.begin(), kKnown.end(), key) == kKnown.end())
-            throw std::runtime_error(path + ": " + key +
-                                     ": found an unknown key, expected name, psd, cross, sines, "
-                                     "direction, g_rms or at");
+        if (std::ranges::find(kKnown, key) == kKnown.end())
+            refuse(path + ": " + key, "an unknown key",
+                   "name, psd, cross, sines, direction, g_rms or at");
     }
 }
 
@@ -55,13 +51,10 @@ std::array<Breakpoints, 3> read_axes(const nlohmann::json& of,
     std::array<Breakpoints, 3> out;
     const std::string known = std::string(names[0]) + ", " + names[1] + ", " + names[2];
     if (!of.is_object() || of.empty())
-        throw std::runtime_error(place + ": found " + of.dump().substr(0, 60) +
-                                 ", expected an object with " + known);
+        refuse(place, of.dump().substr(0, 60), "an object with " + known);
     for (const auto& [key, value] : of.items()) {
         const auto name = std::ranges::find(names, key);
-        if (name == names.end())
-            throw std::runtime_error(place + "." + key + ": found an unknown axis, expected " +
-                                     known);
+        if (name == names.end()) refuse(place + "." + key, "an unknown axis", known);
         out[static_cast<std::size_t>(name - names.begin())] =
             read_pairs(of, place + ".", *name, "[hz, g2_hz]");
     }
@@ -73,15 +66,14 @@ void read_psd(const nlohmann::json& root, Profile& profile, const std::string& p
     const auto psd = root.find("psd"), cross = root.find("cross");
     const bool axes = psd != root.end() && psd->is_object();
     if (cross != root.end() && !axes)
-        throw std::runtime_error(path + ": cross: found without a psd of several axes, expected " +
-                                 "psd {north, up, east}");
+        refuse(path + ": cross", "without a psd of several axes", "psd {north, up, east}");
     if (!axes) {
         profile.psd = read_pairs(root, path + ": ", "psd", "[hz, g2_hz]");
         return;
     }
     if (root.contains("direction") && !root.contains("sines"))
-        throw std::runtime_error(path + ": direction: found with a psd of several axes, expected " +
-                                 "it for sines, or psd [[hz, g2_hz], ..] along one line");
+        refuse(path + ": direction", "with a psd of several axes",
+               "it for sines, or psd [[hz, g2_hz], ..] along one line");
     profile.axes.psd = read_axes(*psd, estimator::spectrum::kAxes, path + ": psd");
     if (cross != root.end())
         profile.axes.cross = read_axes(*cross, estimator::spectrum::kAxisPairs, path + ": cross");
@@ -98,30 +90,26 @@ StatedProfile read_profile(const std::string& path) {
     Profile& profile = stated.profile;
     profile.name = path;
     if (const auto found = root.find("name"); found != root.end()) {
-        if (!found->is_string())
-            throw std::runtime_error(path + ": name: found " + found->dump() + ", expected a text");
+        if (!found->is_string()) refuse(path + ": name", found->dump(), "a text");
         profile.name = found->get<std::string>();
     }
     read_psd(root, profile, path);
     profile.sines = read_pairs(root, path + ": ", "sines", "[hz, g_peak]");
     if (const auto found = root.find("direction"); found != root.end()) {
         if (!found->is_array() || found->size() != 3 ||
-            !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
-            throw std::runtime_error(path + ": direction: found " + found->dump() +
-                                     ", expected [north, up, east]");
+            !std::ranges::all_of(*found, [](auto& x) { return x.is_number(); }))
+            refuse(path + ": direction", found->dump(), "[north, up, east]");
         const auto axes = found->get<std::array<double, 3>>();
         profile.direction = estimator::spectrum::direction_along(axes).value_or(axes);
     }
     if (const auto found = root.find("g_rms"); found != root.end()) {
         if (!found->is_number() || !(found->get<double>() > 0))
-            throw std::runtime_error(path + ": g_rms: found " + found->dump() +
-                                     ", expected a number above 0");
+            refuse(path + ": g_rms", found->dump(), "a number above 0");
         profile.g_rms = found->get<double>();
     }
     if (const auto found = root.find("at"); found != root.end()) {
         if (*found != "platform" && *found != "table")
-            throw std::runtime_error(path + ": at: found " + found->dump() +
-                                     ", expected \"platform\" or \"table\"");
+            refuse(path + ": at", found->dump(), "\"platform\" or \"table\"");
         stated.at = found->get<std::string>();
     }
     check(profile, path + ": ");
@@ -132,25 +120,20 @@ std::vector<Profile> read_controller_psd(const std::string& path) {
     const nlohmann::json root = proto::read_json(path);
     constexpr const char* kForm = "[{\"profile\": NAME, \"psd\": [[hz, g2_hz], ..]}, ..]";
     if (!root.is_array())
-        throw std::runtime_error(path + ": found " + root.dump().substr(0, 60) +
-                                 ", expected a JSON list " + kForm);
+        refuse(path, root.dump().substr(0, 60), std::string("a JSON list ") + kForm);
     std::vector<Profile> out;
     for (const auto& one : root) {
         const std::string place = path + ": [" + std::to_string(out.size()) + "]";
         const auto name = one.is_object() ? one.find("profile") : one.end();
         if (!one.is_object() || name == one.end() || !name->is_string())
-            throw std::runtime_error(place + ": found " + one.dump().substr(0, 60) +
-                                     ", expected an entry of " + kForm);
+            refuse(place, one.dump().substr(0, 60), std::string("an entry of ") + kForm);
         Profile profile;
         profile.name = name->get<std::string>();
         profile.psd = read_pairs(one, place + ": ", "psd", "[hz, g2_hz]");
-        if (profile.psd.empty())
-            throw std::runtime_error(place + ".psd: found nothing, expected [[hz, g2_hz], ..]");
+        if (profile.psd.empty()) refuse(place + ".psd", "nothing", "[[hz, g2_hz], ..]");
         check(profile, place + ".");
-        if (std::any_of(out.begin(), out.end(),
-                        [&](const Profile& other) { return other.name == profile.name; }))
-            throw std::runtime_error(place + ".profile: found " + name->dump() +
-                                     " a second time, expected each once");
+        if (std::ranges::find(out, profile.name, &Profile::name) != out.end())
+            refuse(place + ".profile", name->dump() + " a second time", "each once");
         out.push_back(std::move(profile));
     }
     return out;

@@ -1,8 +1,6 @@
 #include "daemon/plan/type_prior.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -10,6 +8,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "proto/json_text.hpp"
+#include "proto/printed.hpp"
 
 namespace vibrig::plan {
 
@@ -112,17 +111,14 @@ Start start_of(const TypePrior& prior, std::vector<double> measured,
                const estimator::Settings& settings, const estimator::Result& result) {
     const auto found = known(measured, settings, result);
     const auto far = uncertainty::distance(prior.of, found);
-    std::array<char, 200> words{};
-    if (far.outside()) {
-        std::snprintf(words.data(), words.size(),
-                      "; the type is left aside: p = %.2g that one of its units is like this",
-                      far.p);
-        return {std::move(measured), words.data()};
-    }
+    if (far.outside())
+        return {
+            std::move(measured),
+            proto::printed("; the type is left aside: p = %.2g that one of its units is like this",
+                           far.p)};
     const RowMajor joined = uncertainty::with_type(prior.of, found).covariance;
-    std::snprintf(words.data(), words.size(), "; with %zu units of its type, p = %.2g",
-                  prior.of.units, far.p);
-    return {{joined.data(), joined.data() + joined.size()}, words.data()};
+    return {{joined.data(), joined.data() + joined.size()},
+            proto::printed("; with %zu units of its type, p = %.2g", prior.of.units, far.p)};
 }
 
 }  // namespace vibrig::plan

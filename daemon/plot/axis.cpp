@@ -1,9 +1,9 @@
 #include "daemon/plot/axis.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "proto/printed.hpp"
 
 namespace vibrig::tool::plot {
 
@@ -117,16 +117,14 @@ std::string Axis::text_of(double tick) const {
     for (const auto& [value, name] : named) {
         if (value == tick) return name;
     }
-    std::array<char, 32> text{};
     // As many digits as tell one tick from the next.
     int digits = 6;
     if (!log && high > low)
         digits = std::max(
             digits,
             2 + static_cast<int>(std::log10(std::max(std::abs(low), std::abs(high)) / step())));
-    std::snprintf(text.data(), text.size(), "%.*g", std::min(digits, 15),
-                  !log && std::abs(tick) < 1e-12 * (high - low) ? 0 : tick);
-    return text.data();
+    return proto::printed("%.*g", std::min(digits, 15),
+                          !log && std::abs(tick) < 1e-12 * (high - low) ? 0 : tick);
 }
 
 }  // namespace vibrig::tool::plot

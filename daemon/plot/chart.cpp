@@ -310,10 +310,6 @@ std::string Chart::svg() const {
         drawing.out());
 }
 
-void write_file(const std::string& path, const std::string& text) {
-    proto::write_output(path, text);
-}
-
 void make_folder(const std::string& path) {
     std::error_code error;
     std::filesystem::create_directories(path, error);
@@ -326,9 +322,10 @@ void make_folder(const std::string& path) {
 
 void write_pictures(const std::string& path, const Pictures& pictures) {
     const std::filesystem::path where(path);
-    if (where.extension() == ".svg") return write_file(path, pictures.front().second);
+    if (where.extension() == ".svg") return proto::write_output(path, pictures.front().second);
     make_folder(path);
-    for (const auto& [name, svg] : pictures) write_file((where / (name + ".svg")).string(), svg);
+    for (const auto& [name, svg] : pictures)
+        proto::write_output((where / (name + ".svg")).string(), svg);
 }
 
 }  // namespace vibrig::tool::plot

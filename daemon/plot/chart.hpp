@@ -55,8 +55,6 @@ struct Chart {
     [[nodiscard]] std::string svg() const;
 };
 
-/// As proto::write_output() writes it. Throws std::runtime_error naming the path.
-void write_file(const std::string& path, const std::string& text);
 /// A folder for charts, made if there is none. Throws std::runtime_error naming the path.
 void make_folder(const std::string& path);
 

@@ -8,13 +8,11 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "daemon/record/campaign_columns.hpp"
 #include "daemon/record/hdf5.hpp"

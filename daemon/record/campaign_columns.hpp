@@ -8,11 +8,9 @@
 //   column.text(name, field, bytes, description).
 #pragma once
 
-#include <array>
 #include <concepts>
 #include <cstdint>
 #include <initializer_list>
-#include <limits>
 #include <span>
 #include <string>
 #include <type_traits>

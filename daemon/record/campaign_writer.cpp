@@ -116,7 +116,7 @@ void CampaignWriter::write_head(const Head& head) {
 }
 
 void CampaignWriter::put(const Swept& swept) {
-    for (const SweptRow& row : swept.rows) put_row(*sweeps_, row);
+    for (const SweptRow& row : swept) put_row(*sweeps_, row);
 }
 
 void CampaignWriter::put(const Played& played) {

@@ -238,11 +238,10 @@ std::string restart_line(std::size_t dwells) { return comment(kRestart, std::to_
 
 std::string swept_line(const Swept& swept, std::int64_t utc_offset_ns) {
     nlohmann::json readings = nlohmann::json::array();
-    for (const SweptRow& row : swept.rows)
+    for (const SweptRow& row : swept)
         readings.push_back({(row.time + utc_offset_ns) / drivers::kMicrosecond,
                             row.time % drivers::kMicrosecond, row.frequency_hz});
-    return comment(kSwept,
-                   nlohmann::json{swept.rows[0].run, swept.rows[0].position, readings}.dump());
+    return comment(kSwept, nlohmann::json{swept[0].run, swept[0].position, readings}.dump());
 }
 
 std::string played_line(const Played& played) {

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <thread>
@@ -411,7 +410,7 @@ void Recorder::take(const Dwell& dwell) {
 void Recorder::take(const Swept& swept) {
     if (!head_) return;
     kept_.push_back(swept);
-    if (!raw_ || swept.rows.empty()) return;
+    if (!raw_ || swept.empty()) return;
     append_dwells(swept_line(swept, head_->utc_offset_ns));
 }
 

@@ -6,7 +6,6 @@
 #include <bit>
 #include <chrono>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <stdexcept>
 #include <thread>

@@ -1,4 +1,4 @@
-#include "daemon/report/conditions_section.hpp"
+#include "daemon/report/sections.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,7 @@
-#include "daemon/report/lead_section.hpp"
+#include "daemon/report/sections.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "daemon/report/paperwork.hpp"

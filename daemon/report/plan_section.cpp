@@ -1,4 +1,4 @@
-#include "daemon/report/plan_section.hpp"
+#include "daemon/report/sections.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -22,6 +22,15 @@ using record::Campaign;
 
 namespace {
 
+/// For one gyro: the same for all three.
+struct PlanFigures {
+    std::size_t runs = 0, directions = 0, levels = 0, rank = 0;
+    double d_efficiency = 0;  ///< 0: the plan does not determine everything
+    double bound = 0;         ///< by the equivalence theorem, among the plan's own points
+    std::string undetermined;
+    bool by_candidates = false;  ///< compared with the 26 directions; else with its own points
+};
+
 constexpr double kSameDirection = 0.02;  // a degree or so: where the gimbals stop is not exact
 
 /// What the encoders show at the beginning of a dwell that has samples, deg.
@@ -31,8 +40,6 @@ planning::Vec3 position_of(const Campaign& campaign, const record::RecordedDwell
         position[k] = campaign.samples[dwell.first].angle[k] * estimator::kDegPerRad;
     return position;
 }
-
-}  // namespace
 
 PlanFigures plan_figures(const Campaign& campaign, const Analysis& analysis) {
     PlanFigures out;
@@ -83,6 +90,8 @@ PlanFigures plan_figures(const Campaign& campaign, const Analysis& analysis) {
     out.bound = planning::equivalence_bound(run, effort);
     return out;
 }
+
+}  // namespace
 
 void add_plan(Page& page, const Campaign& campaign, const Analysis& analysis) {
     page.section("plan", "Test plan");

@@ -1,13 +1,11 @@
-#include "daemon/report/proof_section.hpp"
+#include "daemon/report/sections.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
-#include <array>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/plot/chart.hpp"
-#include "daemon/report/report.hpp"
+#include "daemon/report/paperwork.hpp"
 
 namespace vibrig::report {
 

@@ -5,22 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
-#include "daemon/report/conditions_section.hpp"
-#include "daemon/report/filter_section.hpp"
 #include "daemon/report/journal_section.hpp"
-#include "daemon/report/lead_section.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/paperwork.hpp"
-#include "daemon/report/plan_section.hpp"
-#include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
-#include "daemon/report/spectrum_section.hpp"
-#include "daemon/report/type_section.hpp"
-#include "daemon/report/uncertainty_section.hpp"
+#include "daemon/report/sections.hpp"
 #include "daemon/version.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/instruction_set.hpp"
@@ -230,12 +222,11 @@ void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
                           rows[i].frequency_hz > 0 ? rows[i].frequency_hz : std::nan(""));
         }
         for (auto* curve : {&amplitude, &frequency}) {
-            Chart chart;
             const bool is_amplitude = curve == &amplitude;
-            chart.title = is_amplitude ? "Amplitude" : "Frequency";
-            chart.x = Axis("time, s");
-            chart.y = Axis(is_amplitude ? "peak at the platform, g" : "Hz");
-            chart.curves.push_back(*curve);
+            const Chart chart{.title = is_amplitude ? "Amplitude" : "Frequency",
+                              .x = Axis("time, s"),
+                              .y = Axis(is_amplitude ? "peak at the platform, g" : "Hz"),
+                              .curves = {*curve}};
             page.figure(chart.svg(), "As the filter saw it in its dwells.");
         }
     }

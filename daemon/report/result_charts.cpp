@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "estimator/filter/parameters.hpp"
@@ -50,10 +49,9 @@ Chart correlation_chart(const std::function<double(std::size_t, std::size_t)>& c
 }
 
 Chart residuals_chart(const Assessment& of) {
-    Chart chart;
-    chart.title = "Residuals of the dwells' rates";
-    chart.x.label = "time since the first dwell, h";
-    chart.y.label = "deg/h";
+    Chart chart{.title = "Residuals of the dwells' rates",
+                .x = Axis("time since the first dwell, h"),
+                .y = Axis("deg/h")};
     for (std::size_t j = 0; j < 3; ++j) {
         Curve curve{.name = fmt::format("gyro {}", "xyz"[j]), .look = Look::dots};
         for (const auto& dwell : of.rates) {
@@ -87,20 +85,14 @@ Chart uncertainties_chart(const estimator::Result& result, const Assessment& of)
 
 void plot_result(const std::string& path, const estimator::Result& result,
                  const Assessment& assessed) {
-    const std::filesystem::path where(path);
-    const auto uncertainties = uncertainties_chart(result, assessed);
-    if (where.extension() == ".svg") return tool::plot::write_file(path, uncertainties.svg());
-    tool::plot::make_folder(path);
-    const auto write = [&](const char* name, const Chart& chart) {
-        tool::plot::write_file((where / name).string(), chart.svg());
-    };
     const auto& p = result.covariance;
     const auto correlation = [&p](std::size_t i, std::size_t j) {
         return p[i][j] / std::sqrt(p[i][i] * p[j][j]);
     };
-    write("uncertainties.svg", uncertainties);
-    write("correlation.svg", correlation_chart(correlation));
-    if (assessed.done) write("residuals.svg", residuals_chart(assessed));
+    tool::plot::Pictures pictures{{"uncertainties", uncertainties_chart(result, assessed).svg()},
+                                  {"correlation", correlation_chart(correlation).svg()}};
+    if (assessed.done) pictures.emplace_back("residuals", residuals_chart(assessed).svg());
+    tool::plot::write_pictures(path, pictures);
 }
 
 }  // namespace vibrig::report

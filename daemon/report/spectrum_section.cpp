@@ -1,4 +1,4 @@
-#include "daemon/report/spectrum_section.hpp"
+#include "daemon/report/sections.hpp"
 
 #include <spdlog/fmt/fmt.h>
 

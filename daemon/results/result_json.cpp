@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "daemon/results/assessment_json.hpp"
@@ -173,8 +174,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
 }
 
 bool all_observable(const estimator::Result& result) {
-    return std::all_of(result.observable.begin(), result.observable.end(),
-                       [](bool b) { return b; });
+    return std::ranges::all_of(result.observable, std::identity());
 }
 
 }  // namespace vibrig::tool

@@ -1,8 +1,6 @@
 #include "daemon/results/result_table.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <string_view>
 
 #include "daemon/results/exit_status.hpp"
@@ -16,9 +14,7 @@ namespace {
 using estimator::uncertainty::Assessment;
 
 std::string number(const char* format, double value) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), format, value);
-    return std::isfinite(value) ? text.data() : "-";
+    return std::isfinite(value) ? printed(format, value) : "-";
 }
 
 const char* unit_of(std::string_view name) {

@@ -1,7 +1,6 @@
 #include "daemon/results/spectrum_json.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -6,7 +6,6 @@
 #include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <optional>
-#include <vector>
 
 #include "daemon/serve/tls.hpp"
 

@@ -9,19 +9,20 @@ namespace vibrig::serve {
 
 namespace {
 
+void fill_row(v1::LoopCheck::Row& to, const CheckRow& row) {
+    to.set_name(proto::mend_utf8(row.name));
+    to.set_unit(proto::mend_utf8(row.unit));
+    if (std::isfinite(row.value)) to.set_value(row.value);
+    if (std::isfinite(row.low)) to.set_low(row.low);
+    if (std::isfinite(row.high)) to.set_high(row.high);
+    to.set_passed(row.passed());
+}
+
 void fill_loop_check(v1::LoopCheck& out, const LoopCheckStatus& check) {
     out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
     out.set_by(proto::mend_utf8(check.by));
     out.set_message(proto::mend_utf8(check.message));
-    for (const auto& row : check.rows) {
-        v1::LoopCheck::Row& to = *out.add_rows();
-        to.set_name(row.name);
-        to.set_unit(row.unit);
-        if (std::isfinite(row.value)) to.set_value(row.value);
-        if (std::isfinite(row.low)) to.set_low(row.low);
-        if (std::isfinite(row.high)) to.set_high(row.high);
-        to.set_passed(row.passed);
-    }
+    for (const CheckRow& row : check.rows) fill_row(*out.add_rows(), row);
 }
 
 void fill_rest_check(v1::RestCheck& out, const RestCheckStatus& check) {
@@ -41,15 +42,7 @@ void fill_proof(v1::Proof& out, const ProofStatus& proof) {
     out.set_passed(proof.passed);
     out.set_message(proto::mend_utf8(proof.message));
     out.set_asks(proof.asks);
-    for (const auto& row : proof.rows) {
-        v1::LoopCheck::Row& to = *out.add_rows();
-        to.set_name(proto::mend_utf8(row.name));
-        to.set_unit(proto::mend_utf8(row.unit));
-        if (std::isfinite(row.value)) to.set_value(row.value);
-        if (std::isfinite(row.low)) to.set_low(row.low);
-        if (std::isfinite(row.high)) to.set_high(row.high);
-        to.set_passed(row.passed);
-    }
+    for (const CheckRow& row : proof.rows) fill_row(*out.add_rows(), row);
     for (const auto& past : proof.history) {
         v1::Proof::Past& to = *out.add_history();
         to.set_utc_ns(past.utc_ns);

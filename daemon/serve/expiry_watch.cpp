@@ -1,6 +1,7 @@
 #include "daemon/serve/expiry_watch.hpp"
 
-#include <array>
+#include <fmt/chrono.h>
+
 #include <ctime>
 
 namespace vibrig::serve {
@@ -15,13 +16,7 @@ int stage_of(std::int64_t left) {
 }  // namespace
 
 std::string date_of(std::int64_t utc_s) {
-    const std::time_t time = utc_s;
-    std::tm parts{};
-    std::array<char, 32> text{};
-    if (gmtime_r(&time, &parts) == nullptr ||
-        std::strftime(text.data(), text.size(), "%Y-%m-%d", &parts) == 0)
-        return "?";
-    return text.data();
+    return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time_t{utc_s}));
 }
 
 std::string ExpiryWatch::check(const std::string& whose, std::int64_t expires, std::int64_t now) {

@@ -1,24 +1,17 @@
 #include "daemon/serve/readiness.hpp"
 
-#include "daemon/serve/expiry_watch.hpp"
+#include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
+
+#include "daemon/serve/expiry_watch.hpp"
 
 namespace vibrig::serve {
 namespace {
 
-constexpr std::array<const char*, 5> kLinkWords{"absent", "connecting", "running", "degraded",
-                                                "fault"};
-
-std::string seconds(double value) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.1f s", value);
-    return text.data();
-}
+std::string seconds(double value) { return fmt::format("{:.1f} s", value); }
 
 /// Whether it writes, and is what was written into it.
 Readiness::Check journal_check(const StatusData& status) {
@@ -59,9 +52,9 @@ Readiness readiness(const StatusData& status) {
         found.checks.push_back({name, passed, std::move(text)});
     };
     add("can", status.can == drivers::PortState::running,
-        std::string("link ") + kLinkWords[static_cast<std::size_t>(status.can)]);
+        std::string("link ") + name_of(status.can));
     add("shaker", status.shaker_link == drivers::LinkState::running && status.shaker.valid,
-        std::string("link ") + kLinkWords[static_cast<std::size_t>(status.shaker_link)] +
+        std::string("link ") + name_of(status.shaker_link) +
             (status.shaker.valid ? "" : ", no reading"));
     add("shaker fault", status.shaker.valid && status.shaker.fault == 0,
         status.shaker.valid ? "fault bits " + std::to_string(status.shaker.fault) : "no reading");
@@ -92,10 +85,9 @@ Readiness readiness(const StatusData& status) {
     add("channels", bad.empty(), bad.empty() ? "all good" : bad);
     add("clock", status.clock_misfit.empty(),
         status.clock_misfit.empty() ? "rig and daemon agree" : status.clock_misfit);
-    std::array<char, 48> rate{};
-    std::snprintf(rate.data(), rate.size(), "%.2f samples/s", status.sample_rate_hz);
     add("sample rate", status.rate_misfit.empty(),
-        status.rate_misfit.empty() ? rate.data() : status.rate_misfit);
+        status.rate_misfit.empty() ? fmt::format("{:.2f} samples/s", status.sample_rate_hz)
+                                   : status.rate_misfit);
     const auto& platform = status.platform;
     const auto platform_state = status.platform_state();
     add("platform", platform_state == ChannelState::good && platform.ready && !platform.fault,

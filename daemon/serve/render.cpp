@@ -1,10 +1,10 @@
 #include "daemon/serve/render.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <ctime>
 
 #include "daemon/serve/value_lines.hpp"
@@ -19,18 +19,8 @@ constexpr int kCell = 26;       // columns of one coefficient
 constexpr int kKinds = 10;      // coefficients of one gyro
 constexpr int kGyros = 3;
 
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-    char text[256];
-    va_list arguments;
-    va_start(arguments, pattern);
-    const int length = std::vsnprintf(text, sizeof text, pattern, arguments);
-    va_end(arguments);
-    return {text,
-            std::min<std::size_t>(static_cast<std::size_t>(std::max(length, 0)), sizeof text - 1)};
-}
-
 std::string labelled(const char* label, const std::string& text) {
-    return format("%-*s", kLabel, label) + text;
+    return fmt::format("{:<{}}{}", label, kLabel, text);
 }
 
 std::string upper(std::string text) {
@@ -42,37 +32,38 @@ std::string upper(std::string text) {
 
 std::string place(const v1::Campaign& campaign) {
     std::string text;
-    if (campaign.run() > 0) text += format("run %d/%d", campaign.run(), campaign.runs());
+    if (campaign.run() > 0) text += fmt::format("run {}/{}", campaign.run(), campaign.runs());
     if (campaign.position() > 0) {
         if (!text.empty()) text += ", ";
-        text += format("position %d/%d", campaign.position(), campaign.positions());
+        text += fmt::format("position {}/{}", campaign.position(), campaign.positions());
     }
     return text;
 }
 
 std::string angles(const v1::Angles& at) {
     if (!at.has_outer_deg() || !at.has_inner_deg() || !at.has_azimuth_deg()) return {};
-    return format("(%g, %g, %g deg)", at.outer_deg(), at.inner_deg(), at.azimuth_deg());
+    return fmt::format("({:g}, {:g}, {:g} deg)", at.outer_deg(), at.inner_deg(), at.azimuth_deg());
 }
 
 /// What the stage with the table at rest is at; empty: there is none.
 std::string stage_line(const v1::Campaign& campaign) {
     if (campaign.state() == v1::Campaign::levelling && campaign.level().tilt_arcmin_size() == 2) {
         const v1::Levelling& level = campaign.level();
-        return format("%s, %.0f s, %+.2f' %+.2f' of %.2f'", level.verdict().c_str(), level.time_s(),
-                      level.tilt_arcmin(0), level.tilt_arcmin(1), level.tolerance_arcmin());
+        return fmt::format("{}, {:.0f} s, {:+.2f}' {:+.2f}' of {:.2f}'", level.verdict(),
+                           level.time_s(), level.tilt_arcmin(0), level.tilt_arcmin(1),
+                           level.tolerance_arcmin());
     }
     if (campaign.state() == v1::Campaign::zeroing && campaign.zeros().sigma_mg_size() == 3) {
         const v1::Zeros& zeros = campaign.zeros();
-        return format("azimuth slews, %.0f s, x %+.3f y %+.3f z %+.3f mg", zeros.time_s(),
-                      zeros.zero_mg(0), zeros.zero_mg(1), zeros.zero_mg(2));
+        return fmt::format("azimuth slews, {:.0f} s, x {:+.3f} y {:+.3f} z {:+.3f} mg",
+                           zeros.time_s(), zeros.zero_mg(0), zeros.zero_mg(1), zeros.zero_mg(2));
     }
     return {};
 }
 
 std::string progress_line(const v1::Campaign& campaign, int width) {
     const double part = std::clamp(campaign.has_progress() ? campaign.progress() : 0.0, 0.0, 1.0);
-    std::string text = format(" %5.1f %%", 100 * part);
+    std::string text = fmt::format(" {:5.1f} %", 100 * part);
     if (campaign.has_remaining_s() && campaign.remaining_s() > 0) {
         text += "  " + render_duration(campaign.remaining_s()) + " left";
     }
@@ -97,7 +88,7 @@ std::string shaker_line(const v1::Status& status) {
     const v1::Shaker& shaker = status.shaker();
     std::string text = shaker_state(shaker);
     text += ", link " + v1::Link::State_Name(shaker.link());
-    if (shaker.fault() != 0) text += format(", fault bits 0x%04x", shaker.fault());
+    if (shaker.fault() != 0) text += fmt::format(", fault bits {:#06x}", shaker.fault());
     if (shaker.rest() == "stop not obeyed") {
         text += ", STOP NOT OBEYED, PRESS THE EMERGENCY STOP: " + shaker.not_at_rest();
     } else if (!shaker.rest().empty()) {
@@ -115,20 +106,18 @@ std::string platform_head(const v1::Platform& platform) {
 std::string rates_line(const v1::Status& status, const Rates& rates) {
     if (!rates.known) return "-";
     std::string text =
-        format("%.1f samples/s, %.1f frames/s", rates.samples_per_s, rates.frames_per_s);
-    if (status.clock() != "real") text += format(", rig time x %.1f", rates.speed);
+        fmt::format("{:.1f} samples/s, {:.1f} frames/s", rates.samples_per_s, rates.frames_per_s);
+    if (status.clock() != "real") text += fmt::format(", rig time x {:.1f}", rates.speed);
     return text;
 }
-
-unsigned long long count(std::uint64_t value) { return value; }
 
 /// Empty: nothing was measured.
 std::string latency_line(const v1::Latency& latency) {
     std::uint64_t batches = 0;
     for (const std::uint64_t n : latency.counts()) batches += n;
     if (batches == 0) return {};
-    return format("frame to ring %.3f ms, worst %.2f ms",
-                  latency.sum_ms() / static_cast<double>(batches), latency.largest_ms());
+    return fmt::format("frame to ring {:.3f} ms, worst {:.2f} ms",
+                       latency.sum_ms() / static_cast<double>(batches), latency.largest_ms());
 }
 
 /// Empty: nothing is known of it.
@@ -137,7 +126,7 @@ std::string real_time_line(const v1::RealTime& real_time) {
     std::uint64_t misses = 0, major = 0, minor = 0;
     for (const auto& thread : real_time.threads()) {
         if (!text.empty()) text += " and ";
-        text += thread.fifo_priority() > 0 ? format("FIFO %d", thread.fifo_priority())
+        text += thread.fifo_priority() > 0 ? fmt::format("FIFO {}", thread.fifo_priority())
                                            : std::string("ordinary");
         misses += thread.deadline_misses();
         major += thread.major_page_faults();
@@ -145,9 +134,9 @@ std::string real_time_line(const v1::RealTime& real_time) {
     }
     if (text.empty()) return {};
     text += real_time.memory_locked() ? ", memory locked" : ", memory not locked";
-    text += real_time.deadline_ms() > 0 ? format(", %llu deadlines missed", count(misses))
+    text += real_time.deadline_ms() > 0 ? fmt::format(", {} deadlines missed", misses)
                                         : std::string(", no deadlines");
-    return text + format(", page faults %llu major %llu minor", count(major), count(minor));
+    return text + fmt::format(", page faults {} major {} minor", major, minor);
 }
 
 std::string channels_line(const v1::Sample& sample) {
@@ -158,7 +147,7 @@ std::string channels_line(const v1::Sample& sample) {
         }
         if (!bad.empty()) bad += ", ";
         bad += channel.name() + ' ' + upper(v1::Channel::Quality_Name(channel.quality()));
-        if (channel.has_age_s()) bad += format(" %.1f s", channel.age_s());
+        if (channel.has_age_s()) bad += fmt::format(" {:.1f} s", channel.age_s());
     }
     return bad.empty() ? "all good" : bad;
 }
@@ -168,21 +157,23 @@ std::string noise_line(const v1::Noise& noise) {
     for (const v1::GyroNoise& gyro : noise.gyros()) {
         if (!gyro.has_fit()) return "-";
         const v1::NoiseTerm& n = gyro.fit().n();
-        text += n.has_value() ? format(" %.2e", n.value()) : format(" <%.1e", n.below());
+        text +=
+            n.has_value() ? fmt::format(" {:.2e}", n.value()) : fmt::format(" <{:.1e}", n.below());
     }
     return text + " deg/rt-h";
 }
 
 std::string guard_line(const v1::Guard& guard) {
     if (!guard.heard()) return "NOT HEARD, " + guard.note();
-    return guard.text().empty() ? "watches" : guard.cause() + ": " + guard.text();
+    if (!guard.text().empty()) return guard.cause() + ": " + guard.text();
+    if (!guard.sees()) return "SEES NO ACCELEROMETER";
+    return guard.reaches_shaker() ? "watches" : "DOES NOT REACH THE SHAKER";
 }
 
 std::string broker_line(const v1::Mqtt& mqtt) {
-    return mqtt.broker() + (mqtt.connected()
-                                ? format(": %llu messages, %llu left out", count(mqtt.messages()),
-                                         count(mqtt.left_out()))
-                                : ": DOWN, " + mqtt.note());
+    return mqtt.broker() + (mqtt.connected() ? fmt::format(": {} messages, {} left out",
+                                                           mqtt.messages(), mqtt.left_out())
+                                             : ": DOWN, " + mqtt.note());
 }
 
 /// Empty: all is well, or nothing is archived.
@@ -192,14 +183,16 @@ std::string archive_head(const v1::Archive& archive) {
 }
 
 std::string cell(const v1::Parameter& parameter) {
-    if (!parameter.has_value()) return format("%-6s        -          ", parameter.name().c_str());
+    if (!parameter.has_value()) return fmt::format("{:<6}        -          ", parameter.name());
     const double value = parameter.value();
-    std::string text =
-        format(std::abs(value) < 1000 ? "%-6s%9.4f" : "%-6s%9.2e", parameter.name().c_str(), value);
+    const std::string text = std::abs(value) < 1000
+                                 ? fmt::format("{:<6}{:9.4f}", parameter.name(), value)
+                                 : fmt::format("{:<6}{:9.2e}", parameter.name(), value);
     if (!parameter.has_sigma()) return text;
     const double sigma = parameter.sigma();
-    return text +
-           format(sigma == 0 || (sigma >= 0.001 && sigma < 100) ? " +-%-7.4f" : " +-%-7.1e", sigma);
+    return text + (sigma == 0 || (sigma >= 0.001 && sigma < 100)
+                       ? fmt::format(" +-{:<7.4f}", sigma)
+                       : fmt::format(" +-{:<7.1e}", sigma));
 }
 
 /// At the end of every line about a rig that is a program.
@@ -212,11 +205,6 @@ int room(const v1::Status& status, int width) {
 
 std::string marked(const v1::Status& status, const std::string& line, int width) {
     return clipped(line, room(status, width)) + (status.simulated() ? kSimulated : "");
-}
-
-std::string padded(std::string text, std::size_t width) {
-    if (text.size() < width) text.append(width - text.size(), ' ');
-    return text;
 }
 
 }  // namespace
@@ -298,7 +286,7 @@ Lines render_coefficients(const v1::Status& status, int width) {
             const int index = column * rows + row;
             if (index >= parameters.size()) continue;
             last = &parameters[index];
-            line += padded(cell(*last), kCell);
+            line += fmt::format("{:<{}}", cell(*last), kCell);
         }
         if (last == nullptr) continue;
         if (columns == kGyros && room_for_them >= columns * kCell + 10) line += last->unit();
@@ -318,14 +306,15 @@ Lines render_table(const v1::Status& status, const Rates& rates, int width) {
 
 std::string render_line(const v1::Status& status) {
     const v1::Campaign& campaign = status.campaign();
-    std::string text = format("%10.1f s  %-9s", status.time_s(),
-                              v1::Campaign::State_Name(campaign.state()).c_str());
+    std::string text = fmt::format("{:10.1f} s  {:<9}", status.time_s(),
+                                   v1::Campaign::State_Name(campaign.state()));
     const std::string where = place(campaign);
     if (!where.empty()) text += "  " + where;
     const std::string at = angles(campaign.position_angles());
     if (!at.empty()) text += ' ' + at;
-    if (campaign.has_progress()) text += format("  %.1f %%", 100 * campaign.progress());
-    if (campaign.has_command_table_g()) text += format("  %.2f g", campaign.command_table_g());
+    if (campaign.has_progress()) text += fmt::format("  {:.1f} %", 100 * campaign.progress());
+    if (campaign.has_command_table_g())
+        text += fmt::format("  {:.2f} g", campaign.command_table_g());
     if (status.can().link() != v1::Link::running) {
         text += "  can " + v1::Link::State_Name(status.can().link());
     }
@@ -352,18 +341,17 @@ std::string render_event(const v1::Event& event) {
     char when[64] = "?";
     std::strftime(when, sizeof when, "%Y-%m-%d %H:%M:%S", &utc);
     return clipped(
-        format("%s.%03dZ  %-7s  %-10s  ", when, event.utc().nanos() / 1'000'000,
-               v1::Event::Severity_Name(event.severity()).c_str(), event.source().c_str()) +
-            event.text(),
+        fmt::format("{}.{:03}Z  {:<7}  {:<10}  {}", when, event.utc().nanos() / 1'000'000,
+                    v1::Event::Severity_Name(event.severity()), event.source(), event.text()),
         2000);
 }
 
 std::string render_duration(double seconds) {
     if (!(seconds >= 0) || seconds > 1e9) return "?";
     const long long whole = std::llround(seconds);
-    if (whole >= 3600) return format("%lld h %02lld min", whole / 3600, whole / 60 % 60);
-    if (whole >= 60) return format("%lld min %02lld s", whole / 60, whole % 60);
-    return format("%lld s", whole);
+    if (whole >= 3600) return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+    if (whole >= 60) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} s", whole);
 }
 
 std::string clipped(const std::string& text, int width) {

@@ -354,7 +354,10 @@ void fill(v1::Status& out, const StatusData& status) {
     fill_values(*out.mutable_mqtt(), "mqtt.", status);
     fill_values(*out.mutable_log(), "log.", status);
     fill(*out.mutable_server(), status.server, status.utc_ns);
-    fill_outside(out, status);
+    if (!status.guard.socket.empty()) fill_values(*out.mutable_guard(), "guard.", status);
+    if (!status.archive.folder.empty()) fill_values(*out.mutable_archive(), "archive.", status);
+    if (status.annunciator.horn || status.annunciator.command)
+        fill_values(*out.mutable_annunciator(), "annunciator.", status);
     if (!status.vibration.kind.empty()) {
         v1::Vibration& vibration = *out.mutable_vibration();
         fill_values(vibration, "vibration.", status);

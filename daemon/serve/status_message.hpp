@@ -1,8 +1,6 @@
 #pragma once
 
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "daemon/status/source.hpp"
 
@@ -26,9 +24,7 @@ namespace vibrig::serve {
 void fill(v1::Status& out, const StatusData& status);
 /// Fills a part of it, "journal.", with what daemon/status/values.hpp has of it.
 void fill_values(google::protobuf::Message& out, std::string_view part, const StatusData& status);
-/// Part of it: guard and annunciator, where they are configured.
-void fill_outside(v1::Status& out, const StatusData& status);
-/// Likewise of the newest loop check and safe-state proof.
+/// Part of it: the newest loop check and safe-state proof.
 void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);

@@ -1,7 +1,6 @@
 #include "daemon/serve/stream_feed.hpp"
 
 #include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>

@@ -6,7 +6,6 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "daemon/serve/caller.hpp"
 #include "daemon/status/source.hpp"

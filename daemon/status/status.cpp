@@ -3,26 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proto/word_of.hpp"
+
 namespace vibrig {
 
 const char* name_of(ChannelState state) noexcept {
-    switch (state) {
-        case ChannelState::good:
-            return "good";
-        case ChannelState::missing:
-            return "missing";
-        case ChannelState::flagged:
-            return "flagged";
-        case ChannelState::out_of_range:
-            return "out_of_range";
-        case ChannelState::unbound:
-            return "unbound";
-        case ChannelState::silent:
-            return "silent";
-        case ChannelState::never:
-            return "never";
-    }
-    return "?";
+    static constexpr std::array kWords{"good",    "missing", "flagged", "out_of_range",
+                                       "unbound", "silent",  "never"};
+    return proto::word_of(kWords, state);
 }
 
 ChannelState StatusData::channel(std::size_t c) const noexcept {

@@ -59,11 +59,6 @@ std::optional<double> rms_of(const rt::RestWitness& witness) {
         witness.rms_g);
 }
 
-const char* word_of(drivers::ControllerState state) {
-    constexpr std::array<const char*, 4> kWords{"active", "warning", "passive", "bus off"};
-    return kWords[static_cast<std::size_t>(state)];
-}
-
 std::uint64_t raised(const S& s) {
     std::uint64_t count = 0;
     for (const auto& one : s.interlock.rows) count += one.raised ? 1 : 0;
@@ -243,7 +238,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("can.send_failed", "", [](auto& s) { return s.can_counters.send_failed; })
         .counter("vibrig_can_send_failures_total", "Frames that could not be sent."),
     row("can.transitions", "", [](auto& s) { return s.can_counters.transitions; }),
-    row("can.controller", "", [](auto& s) { return word_of(s.can_counters.controller); }),
+    row("can.controller", "", [](auto& s) { return drivers::name_of(s.can_counters.controller); }),
 
     row("assembler.received", "", [](auto& s) { return s.assembler.received; }),
     row("assembler.used", "", [](auto& s) { return s.assembler.used; }),

@@ -48,24 +48,20 @@ std::string encode(const CampaignRecord& record) {
 }
 
 CampaignRecord decode(std::string_view bytes) {
-    CampaignRecord record;
+    if (bytes.size() > 1 && bytes[0] == kFailed) return {.failed = std::string(bytes.substr(1))};
     Numbers numbers;
-    if (bytes.size() > 1 && bytes[0] == kFailed) {
-        record.failed = bytes.substr(1);
-        return record;
-    }
     if (bytes.size() < 1 + sizeof numbers || bytes[0] != kCampaign)
         throw std::runtime_error("found no record of a campaign, expected one");
     std::memcpy(&numbers, bytes.data() + 1, sizeof numbers);
-    record.error = numbers.error;
-    record.u_a = numbers.u_a;
-    record.u = numbers.u;
-    record.nees_a = numbers.nees_a;
-    record.nees = numbers.nees;
-    record.hours = numbers.hours;
-    record.verdict = static_cast<std::uint8_t>(numbers.verdict);
-    record.reasons = bytes.substr(1 + sizeof numbers);
-    return record;
+    return {"",
+            numbers.error,
+            numbers.u_a,
+            numbers.u,
+            numbers.nees_a,
+            numbers.nees,
+            numbers.hours,
+            static_cast<std::uint8_t>(numbers.verdict),
+            std::string(bytes.substr(1 + sizeof numbers))};
 }
 
 }  // namespace vibrig::study

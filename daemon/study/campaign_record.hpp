@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "estimator/identification/identification.hpp"
 
@@ -20,7 +19,7 @@ struct CampaignRecord {
     double nees_a = 0, nees = 0;  ///< with the covariance of noise alone, and of all; NaN: none
     double hours = 0;             ///< that the campaign takes on the rig
     std::uint8_t verdict = 0;     ///< as estimator::uncertainty::Level
-    std::string reasons;          ///< codes with commas between, the strongest first
+    std::string reasons = {};     ///< codes with commas between, the strongest first
 };
 
 /// Record of a task that has failed; cut to a readable length, always UTF-8.

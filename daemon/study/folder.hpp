@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "daemon/study/campaigns.hpp"
 #include "daemon/study/parts.hpp"

@@ -17,8 +17,10 @@ void add_line(std::vector<std::string>& lines, const std::string& line) {
 }  // namespace
 
 struct Merged::Source {
-    std::string file;
-    bool closed;
+    Source(const Folder& folder, const PartName& name)
+        : part(name), reader(folder.parts() + "/" + name.file, folder.id, folder.tasks()) {}
+
+    PartName part;
     PartReader reader;
     TaskRecord record;
 };
@@ -27,13 +29,11 @@ Merged::Merged(const Folder& folder) : folder_(folder) {
     std::vector<std::string> others;
     std::vector<std::pair<std::uint64_t, PartName>> first;
     for (const PartName& name : parts_in(folder.parts(), &others)) {
-        Source source{name.file,
-                      name.closed,
-                      {folder.parts() + "/" + name.file, folder.id, folder.tasks()},
-                      {}};
+        Source source(folder, name);
         if (advance(source)) first.emplace_back(source.record.index, name);
     }
-    for (const std::string& other : others) add_line(foreign_, other + ": not a part of a study");
+    for (const std::string& other : others)
+        add_line(found_.foreign, other + ": not a part of a study");
     std::ranges::stable_sort(first, {}, &std::pair<std::uint64_t, PartName>::first);
     waiting_.assign(first.begin(), first.end());
 }
@@ -42,17 +42,17 @@ Merged::~Merged() = default;
 
 bool Merged::advance(Source& source) {
     if (source.reader.next(source.record)) return true;
-    const std::string line = source.file + ": " + source.reader.why();
+    const std::string line = source.part.file + ": " + source.reader.why();
     const PartReader::End end = source.reader.end();
     if (end == PartReader::End::whole) {
-        read_.insert(source.file);
+        read_.insert(source.part.file);
     } else if (end == PartReader::End::foreign) {
-        add_line(foreign_, line);
-    } else if (end == PartReader::End::torn && !source.closed) {
-        read_.insert(source.file);
-        add_line(unfinished_, line);
+        add_line(found_.foreign, line);
+    } else if (end == PartReader::End::torn && !source.part.closed) {
+        read_.insert(source.part.file);
+        add_line(found_.unfinished, line);
     } else {
-        add_line(damaged_, line);
+        add_line(found_.damaged, line);
     }
     return false;
 }
@@ -60,24 +60,19 @@ bool Merged::advance(Source& source) {
 /// Those that may hold the index.
 void Merged::begin_until(std::uint64_t index) {
     while (!waiting_.empty() && waiting_.front().first <= index) {
-        const PartName name = waiting_.front().second;
+        auto source = std::make_unique<Source>(folder_, waiting_.front().second);
         waiting_.pop_front();
-        auto source = std::make_unique<Source>(
-            Source{name.file,
-                   name.closed,
-                   {folder_.parts() + "/" + name.file, folder_.id, folder_.tasks()},
-                   {}});
         if (advance(*source)) open_.push_back(std::move(source));
     }
 }
 
 void Merged::miss(std::uint64_t from, std::uint64_t to) {
     if (from >= to) return;
-    missing_count_ += to - from;
-    if (!missing_.empty() && missing_.back().second + 1 == from) {
-        missing_.back().second = to - 1;
-    } else if (missing_.size() < kMostLines) {
-        missing_.emplace_back(from, to - 1);
+    found_.missing_count += to - from;
+    if (!found_.missing.empty() && found_.missing.back().second + 1 == from) {
+        found_.missing.back().second = to - 1;
+    } else if (found_.missing.size() < kMostLines) {
+        found_.missing.emplace_back(from, to - 1);
     }
 }
 
@@ -96,7 +91,7 @@ bool Merged::next(TaskRecord& record) {
         begin_until((*std::ranges::min_element(open_, by_index))->record.index);
         const Source& first = **std::ranges::min_element(open_, by_index);
         const std::uint64_t index = first.record.index;
-        const std::string first_file = first.file;
+        const std::string first_file = first.part.file;
         record = first.record;
         bool agree = true;
         std::uint64_t times = 0;
@@ -105,15 +100,14 @@ bool Merged::next(TaskRecord& record) {
             ++times;
             if (source->record.bytes != record.bytes) {
                 agree = false;
-                add_line(contradictions_, "task " + std::to_string(index) + ": " + first_file +
-                                              " and " + source->file +
-                                              " have different results: a defect or bad memory");
+                add_line(found_.contradictions,
+                         "task " + std::to_string(index) + ": " + first_file + " and " +
+                             source->part.file + " have different results: a defect or bad memory");
             }
             if (!advance(*source)) source.reset();
         }
         std::erase(open_, nullptr);
-        records_ += times;
-        duplicates_ += times - 1;
+        found_.duplicates += times - 1;
         miss(expected_, index);
         expected_ = index + 1;
         if (agree) return true;
@@ -144,7 +138,7 @@ Compaction compact(const Folder& folder) {
         records.clear();
         bytes = 0;
     }
-    for (const auto* wrong : {&merged.contradictions(), &merged.foreign()}) {
+    for (const auto* wrong : {&merged.found().contradictions, &merged.found().foreign}) {
         if (wrong->empty()) continue;
         std::error_code ignored;
         if (!writer.path().empty()) std::filesystem::remove(writer.path(), ignored);

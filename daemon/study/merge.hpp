@@ -12,6 +12,18 @@
 
 namespace vibrig::study {
 
+/// What parts lack or have too much of.
+struct MergeFindings {
+    /// [first, last] of what no part has, or what two parts have differently.
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> missing;
+    std::uint64_t missing_count = 0, duplicates = 0;
+    /// One line each. Damage is named even where another part has what was lost.
+    std::vector<std::string> damaged;
+    /// Torn at its end, of a process that was killed or still writes: that is no damage.
+    std::vector<std::string> unfinished;
+    std::vector<std::string> foreign, contradictions;
+};
+
 /// The records of all parts in the order of their index, each once. Few files are open at a time,
 /// and memory does not grow with the number of tasks.
 class Merged {
@@ -21,20 +33,8 @@ class Merged {
 
     bool next(TaskRecord& record);
 
-    /// After the last: [first, last] of what no part has, or what two parts have differently.
-    [[nodiscard]] const std::vector<std::pair<std::uint64_t, std::uint64_t>>& missing() const {
-        return missing_;
-    }
-    [[nodiscard]] std::uint64_t missing_count() const { return missing_count_; }
-    [[nodiscard]] std::uint64_t records() const { return records_; }
-    [[nodiscard]] std::uint64_t duplicates() const { return duplicates_; }
-    /// One line each. Damage is named even where another part has what was lost.
-    [[nodiscard]] const std::vector<std::string>& damaged() const { return damaged_; }
-    /// Torn at its end, of a process that was killed or still writes: that is no damage.
-    [[nodiscard]] const std::vector<std::string>& unfinished() const { return unfinished_; }
-    [[nodiscard]] const std::vector<std::string>& foreign() const { return foreign_; }
-    [[nodiscard]] const std::vector<std::string>& contradictions() const { return contradictions_; }
-
+    /// Whole after the last record.
+    [[nodiscard]] const MergeFindings& found() const { return found_; }
     /// Whether all that there is of a part was read.
     [[nodiscard]] bool read_to_its_end(const std::string& file) const {
         return read_.contains(file);
@@ -49,9 +49,8 @@ class Merged {
     const Folder& folder_;
     std::deque<std::pair<std::uint64_t, PartName>> waiting_;  ///< first index
     std::vector<std::unique_ptr<Source>> open_;
-    std::uint64_t expected_ = 0, missing_count_ = 0, records_ = 0, duplicates_ = 0;
-    std::vector<std::pair<std::uint64_t, std::uint64_t>> missing_;
-    std::vector<std::string> damaged_, unfinished_, foreign_, contradictions_;
+    std::uint64_t expected_ = 0;
+    MergeFindings found_;
     std::set<std::string> read_;
 };
 

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/identified_recording.hpp"

@@ -1,7 +1,6 @@
 #include "daemon/study/recordings.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>

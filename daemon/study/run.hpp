@@ -5,7 +5,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "daemon/study/folder.hpp"
 #include "daemon/study/worker.hpp"

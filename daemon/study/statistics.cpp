@@ -5,6 +5,9 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <limits>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::study {
 
@@ -76,6 +79,11 @@ std::vector<double> chi_square_bounds(std::size_t bins, double degrees) {
         bounds.push_back(
             chi_square_quantile(degrees, static_cast<double>(i) / static_cast<double>(bins)));
     return bounds;
+}
+
+double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
+    if (covariance.rows() != error.size()) return std::numeric_limits<double>::quiet_NaN();
+    return estimator::linear_algebra::squared_distance(covariance, error);
 }
 
 }  // namespace vibrig::study

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -33,5 +33,8 @@ struct ChiSquareMean {
 [[nodiscard]] ChiSquareMean chi_square_mean(double sum, std::uint64_t n, double degrees);
 /// Bounds between `bins` bins that are equally likely under chi-square.
 [[nodiscard]] std::vector<double> chi_square_bounds(std::size_t bins, double degrees);
+
+/// Error squared in units of its covariance; NaN if that is none.
+[[nodiscard]] double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance);
 
 }  // namespace vibrig::study

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <ctime>
 
-#include "daemon/study/merge.hpp"
-
 namespace vibrig::study {
 
 namespace {
@@ -54,21 +52,16 @@ StudyStatus status_of(const Folder& folder, double fresh_s) {
         ++out.done;
         if (record.bytes[0] == 'F') ++out.failed;
     }
-    out.missing = merged.missing_count();
-    out.missing_ranges = merged.missing();
-    out.duplicates = merged.duplicates();
-    out.foreign = merged.foreign();
-    out.contradictions = merged.contradictions();
-    out.damaged = merged.damaged();
+    out.found = merged.found();
     // The end of what is being written is not torn.
-    for (const std::string& line : merged.unfinished()) {
+    for (const std::string& line : merged.found().unfinished) {
         if (std::ranges::none_of(out.running, [&](const RunningPart& part) {
                 return line.starts_with(part.file + ": torn");
             }))
-            out.damaged.push_back(line);
+            out.found.damaged.push_back(line);
     }
-    if (per_s > 0) out.left_s = static_cast<double>(out.missing) / per_s;
-    if (out.missing == 0) out.left_s = 0;
+    if (per_s > 0) out.left_s = static_cast<double>(out.found.missing_count) / per_s;
+    if (out.found.missing_count == 0) out.left_s = 0;
     return out;
 }
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/study/folder.hpp"
+#include "daemon/study/merge.hpp"
 
 namespace vibrig::study {
 
@@ -19,11 +19,10 @@ struct RunningPart {
 };
 
 struct StudyStatus {
-    std::uint64_t tasks = 0, done = 0, failed = 0, missing = 0, duplicates = 0, parts = 0;
-    std::vector<std::pair<std::uint64_t, std::uint64_t>> missing_ranges;
+    std::uint64_t tasks = 0, done = 0, failed = 0, parts = 0;
     std::vector<RunningPart> running;
-    std::vector<std::string> damaged, foreign, contradictions;
-    double left_s = -1;  ///< at the rate of those that run; negative: not known
+    MergeFindings found;  ///< damaged: what is torn and nobody writes any more, too
+    double left_s = -1;   ///< at the rate of those that run; negative: not known
 };
 
 /// Reads all parts. `fresh_s`: who has written within it counts as running.

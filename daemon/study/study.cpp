@@ -179,7 +179,7 @@ class Reader {
 
     void read_trials(const toml::node& node) {
         constexpr std::int64_t kMost = 1'000'000'000;
-        const auto trials = whole(node, "study.trials", 2 * kTrialsOfBlock, kMost);
+        const auto trials = whole(node, "study.trials", kTrialsOfBlock, kMost);
         study_.runs = trials / kTrialsOfBlock;
         if (trials % kTrialsOfBlock != 0)
             problem(node, "study.trials", describe(node),
@@ -198,7 +198,13 @@ class Reader {
         if (table == nullptr) return;
         for (const auto& [key, node] : *table) {
             const auto of = kKeysOf.find(std::string(key.str()));
-            if (of != kKeysOf.end() && !of->second.contains(study_.kind))
+            if (of == kKeysOf.end() || of->second.contains(study_.kind)) continue;
+            // One [study] is copied from kind to kind: what every kind may have does no harm.
+            if (key == "seed" || key == "runs")
+                study_.warnings.push_back(
+                    where(node.source()) + ": study." + of->first + ": found " + describe(node) +
+                    ", without effect in a study of kind \"" + study_.kind + "\"");
+            else
                 problem(node, "study." + of->first, describe(node), no);
         }
         if (study_.kind == "recordings" && !table->contains("folders"))
@@ -420,13 +426,11 @@ Study parse_study(const std::string& text, const std::string& name) {
 }
 
 void put(std::vector<Setting>& settings, const Setting& setting) {
-    for (Setting& one : settings) {
-        if (one.key == setting.key) {
-            one = setting;
-            return;
-        }
-    }
-    settings.push_back(setting);
+    const auto same = std::ranges::find(settings, setting.key, &Setting::key);
+    if (same == settings.end())
+        settings.push_back(setting);
+    else
+        *same = setting;
 }
 
 std::string configuration_text(const std::vector<Setting>& settings) {

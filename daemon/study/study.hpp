@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -71,6 +70,7 @@ struct Study {
     std::vector<Setting> configuration;  ///< [campaign] and [identify], for the daemon's own reader
     std::vector<RigSetting> rig;
     std::vector<Axis> grid;
+    std::vector<std::string> warnings;  ///< what stands in the file without effect
 
     [[nodiscard]] std::uint64_t points() const;
     [[nodiscard]] std::uint64_t tasks() const { return points() * runs; }

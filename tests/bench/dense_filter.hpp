@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "estimator/filter/ud_memory.hpp"
+#include "estimator/filter/ud_kernel.hpp"
 
 namespace vibrig::bench {
 

@@ -36,6 +36,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "proto/durable_file.hpp"
 #include "tests/bench/growth_server.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
@@ -278,7 +279,7 @@ void chart(const std::string& from, const std::string& to) {
         if (chart.curves.size() >= 8) curve.look = tool::plot::Look::dashed;
         chart.curves.push_back(curve);
     }
-    tool::plot::write_file(to, chart.svg());
+    proto::write_output(to, chart.svg());
 }
 
 }  // namespace

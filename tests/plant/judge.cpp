@@ -7,6 +7,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "proto/json_file.hpp"
+
 namespace vibrig::plant {
 namespace {
 
@@ -50,9 +52,9 @@ void judge_one(JudgedCoefficient& c, const Json* entry, double limit) {
 Verdict judge(const std::string& text, const std::string& file, const Truth& truth, double limit) {
     Json root;
     try {
-        root = Json::parse(text);
-    } catch (const Json::exception& error) {
-        throw PlantError(file + ": not JSON: " + error.what());
+        root = proto::parse_json(text, file, "not JSON, expected an identification result");
+    } catch (const std::runtime_error& error) {
+        throw PlantError(error.what());
     }
     if (!root.is_object() || !root.contains("parameters") || !root["parameters"].is_array()) {
         throw PlantError(file +

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,17 +31,15 @@ int main(int argc, char** argv) {
     vibrig::proto::refuse_empty_values(app);
     vibrig::proto::keep_named_files(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
-        std::fputs(vibrig::proto::command_tree_json(
-                       app, {{0, "done; judge: all coefficients within the limit"},
-                             {1, "judge: not so"},
-                             {2, "bad usage or input"}})
-                       .c_str(),
-                   stdout);
-        return 0;
+        std::cout << vibrig::proto::command_tree_json(
+            app, {{0, "done; judge: all coefficients within the limit"},
+                  {1, "judge: not so"},
+                  {2, "bad usage or input"}});
+        return vibrig::proto::printed(app);
     }
     if (argc == 2 && std::string_view(argv[1]) == "--print-dbc") {
-        const auto text = vibrig::proto::rig_dbc_text();
-        return std::fwrite(text.data(), 1, text.size(), stdout) == text.size() ? 0 : 2;
+        std::cout << vibrig::proto::rig_dbc_text();
+        return vibrig::proto::printed(app);
     }
     try {
         // "vibrig-plant --can ..." means run.
@@ -52,7 +51,7 @@ int main(int argc, char** argv) {
         std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
         app.parse(arguments);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
     } catch (const std::exception& error) {
         std::fprintf(stderr, "vibrig-plant: %s\n", error.what());
         return 2;

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "proto/durable_file.hpp"
+#include "proto/json_file.hpp"
 #include "tests/plant/truth_fields.hpp"
 
 namespace vibrig::plant {
@@ -297,9 +298,9 @@ std::array<GyroCoefficients, 3> Truth::table2() noexcept {
 Truth parse_truth(std::string_view text, const std::string& file) {
     Json root;
     try {
-        root = Json::parse(text);
-    } catch (const Json::exception& error) {
-        throw PlantError(file + ": not JSON: " + error.what());
+        root = proto::parse_json<Json>(std::string(text), file, "not JSON, expected a truth file");
+    } catch (const std::runtime_error& error) {
+        throw PlantError(error.what());
     }
     if (!root.is_object())
         throw PlantError(file + ": found " + text_of(root) + ", expected an object");

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <stdexcept>
 #include <vector>
 
@@ -75,6 +74,10 @@ int run(const Options& options) {
         {"exponential", allan::WindowShape::exponential}};
     request.shape = shapes.at(options.shape);
     if (options.live) return allan_live(request, options.json, options.plot) ? kAlarms : 0;
+    if (options.plot.ends_with(".html"))
+        throw std::runtime_error("--plot: found " + options.plot +
+                                 ", a page is of --live; expected a name that ends in .svg, or a "
+                                 "folder");
     const AllanAnalysis analysis = analyse(request);
     if (!options.plot.empty()) allan_plot(analysis, options.plot);
     std::cout << (options.json ? allan_json(analysis) + "\n" : allan_table(analysis));
@@ -150,10 +153,11 @@ void add_allan(CLI::App& app, int& exit_code) {
     command.add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
     add_dynamic_options(command, options);
     command.add_flag("--json", options.json, "print the result as JSON");
-    command.add_option(
-        "--plot", options.plot,
-        "an SVG file (with --dynamic the surface), or a folder for every chart; with "
-        "--live an .html file of both charts, which loads itself again");
+    command
+        .add_option("--plot", options.plot,
+                    "an SVG file (with --dynamic the surface), or a folder for every chart; with "
+                    "--live an .html file of both charts, which loads itself again")
+        ->check(proto::charts(true, true));
     // A window is printed and gone.
     for (const char* whole :
          {"--fit", "--taus", "--type", "--drop-outliers", "--column", "--time"}) {

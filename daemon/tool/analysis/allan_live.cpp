@@ -52,10 +52,10 @@ constexpr std::chrono::seconds kPagePeriod{2};
 
 /// What a browser shows while the windows come; complete at any moment it is read.
 void write_page(const std::string& path, const AllanAnalysis& shown) {
-    plot::write_file(path,
-                     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">"
-                     "<meta http-equiv=\"refresh\" content=\"2\"><title>Allan, live</title>" +
-                         surface_chart(shown).svg() + traces_chart(shown).svg() + "</html>\n");
+    proto::write_output(path,
+                        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">"
+                        "<meta http-equiv=\"refresh\" content=\"2\"><title>Allan, live</title>" +
+                            surface_chart(shown).svg() + traces_chart(shown).svg() + "</html>\n");
 }
 
 }  // namespace

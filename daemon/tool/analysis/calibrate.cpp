@@ -1,9 +1,7 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -266,7 +264,8 @@ void add_calibrate(CLI::App& app, int& exit_code) {
         ->delimiter(',');
     add_number(command, "--level", options.level, "of the tests of the residuals (0.01)", 1e-9,
                0.5);
-    command.add_option("--plot", options.plot, "an SVG file, or a folder: the residuals");
+    command.add_option("--plot", options.plot, "an SVG file, or a folder: the residuals")
+        ->check(proto::charts());
     command.add_flag("--json", options.json, "print the result as JSON");
     command.footer(
         "Example: vibrig calibrate turntable.csv --sigma 2e-6 --json\n"

@@ -1,7 +1,5 @@
-#include <exception>
 #include <iostream>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include "daemon/report/result_charts.hpp"
@@ -76,9 +74,11 @@ void add_identify(CLI::App& app, int& exit_code) {
         .add_option("--instruction-set", options.instruction_set,
                     "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
-    command.add_option("--plot", options.plot,
-                       "an SVG file: uncertainties of the coefficients; or a folder: their "
-                       "correlation and the dwells' residuals, too");
+    command
+        .add_option("--plot", options.plot,
+                    "an SVG file: uncertainties of the coefficients; or a folder: their "
+                    "correlation and the dwells' residuals, too")
+        ->check(proto::charts());
     command.add_flag("--json", options.json, "print the result as JSON");
     command
         .add_option(

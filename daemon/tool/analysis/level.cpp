@@ -1,4 +1,3 @@
-#include <memory>
 #include <stdexcept>
 #include <vector>
 
@@ -90,7 +89,7 @@ void add_design_options(CLI::App& command, Options& o) {
     add_number(command, "--gyro-noise", o.gyro_noise, "random walk, deg/sqrt(h) (0)", 0, 100);
     add_number(command, "--gravity", o.gravity, "m/s^2 (9.80665)", 1, 30);
     command.add_flag("--json", o.json, "print the result as JSON");
-    command.add_option("--plot", o.plot, "an SVG file, or a folder");
+    command.add_option("--plot", o.plot, "an SVG file, or a folder")->check(proto::charts());
 }
 
 void add_simulate_options(CLI::App& command, Options& o) {

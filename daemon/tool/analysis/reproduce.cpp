@@ -6,7 +6,6 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <cmath>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -18,6 +17,7 @@
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/tool/commands.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/json_number.hpp"
 #include "proto/json_text.hpp"
 
@@ -204,7 +204,7 @@ int run(const std::string& name, const ReproduceOptions& options, bool as_json) 
             for (const auto& [file, chart] : reproduction.charts) {
                 const std::string path =
                     options.plot + "/" + reproduction.name + "-" + file + ".svg";
-                plot::write_file(path, chart.svg());
+                proto::write_output(path, chart.svg());
             }
             if (as_json) {
                 list.push_back(json(reproduction));
@@ -243,7 +243,8 @@ void add_reproduce(CLI::App& app, int& exit_code) {
         ->check(CLI::IsMember(names));
     command->add_option("--seeds", options->reproduce.seeds, "Monte-Carlo runs of each study")
         ->check(CLI::Range(std::size_t{2}, std::size_t{100000}));
-    command->add_option("--plot", options->reproduce.plot, "folder for charts (SVG)");
+    command->add_option("--plot", options->reproduce.plot, "folder for charts (SVG)")
+        ->check(proto::charts(false));
     command->add_flag("--json", options->json, "print the result as JSON");
     command->footer(
         "Example: vibrig reproduce tang2009 --seeds 32 --plot charts\n"

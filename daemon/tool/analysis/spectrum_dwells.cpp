@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "daemon/plan/number_table.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "proto/json_file.hpp"
@@ -21,25 +22,23 @@ constexpr double kSameFrequency = 0.02;  ///< relative: the rules of the referen
 int count_of(const SpectraJson& entry, const char* key, const std::string& place) {
     const auto found = entry.find(key);
     if (found == entry.end() || !found->is_number_integer() || found->get<int>() < 1)
-        throw std::runtime_error(place + key + ": found " +
-                                 (found == entry.end() ? "nothing" : found->dump()) +
-                                 ", expected a number from 1");
+        plan::refuse(place + key, found == entry.end() ? "nothing" : found->dump(),
+                     "a number from 1");
     return found->get<int>();
 }
 
 using Pairs = std::vector<std::pair<double, double>>;
 
 Pairs pairs_of(const SpectraJson& list, const std::string& key, const std::string& form) {
-    if (!list.is_array())
-        throw std::runtime_error(key + ": found " + list.dump() + ", expected [" + form + ", ..]");
+    if (!list.is_array()) plan::refuse(key, list.dump(), "[" + form + ", ..]");
     Pairs pairs;
     for (const SpectraJson& one : list) {
         const bool good = one.is_array() && one.size() == 2 && one[0].is_number() &&
                           one[1].is_number() && one[0].get<double>() > 0 &&
                           one[1].get<double>() > 0;
         if (!good)
-            throw std::runtime_error(key + "[" + std::to_string(pairs.size()) + "]: found " +
-                                     one.dump() + ", expected " + form + ", both above 0");
+            plan::refuse(key + "[" + std::to_string(pairs.size()) + "]", one.dump(),
+                         form + ", both above 0");
         pairs.emplace_back(one[0].get<double>(), one[1].get<double>());
     }
     return pairs;
@@ -63,18 +62,15 @@ StatedSpectrum stated_of(const SpectraJson& entry, const std::string& place) {
                      : found->is_number_unsigned() ? found->dump()
                                                    : "";
         if (of.profile.empty() || of.profile == "0")
-            throw std::runtime_error(place + "profile: found " + found->dump() +
-                                     ", expected a profile's name or number");
+            plan::refuse(place + "profile", found->dump(), "a profile's name or number");
         ++count;
     }
     if (count != 1)
-        throw std::runtime_error(place + "lines: found " +
-                                 (count == 0 ? "nothing" : "more beside it") +
-                                 ", expected [[hz, g_peak], ..], empty at rest; or profile or psd");
+        plan::refuse(place + "lines", count == 0 ? "nothing" : "more beside it",
+                     "[[hz, g_peak], ..], empty at rest; or profile or psd");
     if (const auto found = entry.find("level_db"); found != entry.end()) {
         if (!found->is_number() || of.profile.empty())
-            throw std::runtime_error(place + "level_db: found " + found->dump() +
-                                     ", expected the level of a profile, dB");
+            plan::refuse(place + "level_db", found->dump(), "the level of a profile, dB");
         of.level_db = found->get<double>();
     }
     return of;
@@ -102,10 +98,9 @@ plan::StatedProfile profile_of(const StatedSpectrum& of, const configuration::Co
     }
     std::string known;
     for (const auto& one : rig.profiles) known += one.profile.name + ", ";
-    throw std::runtime_error(place + "profile: found '" + of.profile +
-                             "', expected the name or number of a [[profile]] of the "
-                             "configuration: one of " +
-                             known + "minimum-integrity, truck");
+    plan::refuse(place + "profile", "'" + of.profile + "'",
+                 "the name or number of a [[profile]] of the configuration: one of " + known +
+                     "minimum-integrity, truck");
 }
 
 std::vector<Band> bands_of_lines(const Pairs& lines) {
@@ -135,14 +130,14 @@ Spectra read_spectra(const std::string& path) {
     for (std::size_t i = 0; i < root.size(); ++i) {
         const std::string place = path + ": [" + std::to_string(i) + "].";
         if (!root[i].is_object())
-            throw std::runtime_error(path + ": [" + std::to_string(i) + "]: found " +
-                                     root[i].dump() +
-                                     ", expected {run, position, lines | profile | psd}");
+            plan::refuse(path + ": [" + std::to_string(i) + "]", root[i].dump(),
+                         "{run, position, lines | profile | psd}");
         const std::pair key{count_of(root[i], "run", place), count_of(root[i], "position", place)};
         if (!spectra.emplace(key, stated_of(root[i], place)).second)
-            throw std::runtime_error(place + "run: found run " + std::to_string(key.first) +
-                                     ", position " + std::to_string(key.second) +
-                                     " twice, expected once");
+            plan::refuse(place + "run",
+                         "run " + std::to_string(key.first) + ", position " +
+                             std::to_string(key.second) + " twice",
+                         "once");
     }
     return spectra;
 }
@@ -155,32 +150,30 @@ void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
     };
     for (const auto* row : rows) {
         if (row->frequency_hz != first.frequency_hz)
-            throw std::runtime_error(
-                line(*row) + "column frequency_hz: found " + std::to_string(row->frequency_hz) +
-                " after " + std::to_string(first.frequency_hz) +
-                ", expected one frequency in a dwell, or a sweep through 10 % at least");
+            plan::refuse(
+                line(*row) + "column frequency_hz",
+                std::to_string(row->frequency_hz) + " after " + std::to_string(first.frequency_hz),
+                "one frequency in a dwell, or a sweep through 10 % at least");
         if (row->profile != first.profile || row->level_db != first.level_db)
-            throw std::runtime_error(line(*row) +
-                                     "column profile: found another profile or level than in the "
-                                     "row before, expected one in a dwell");
+            plan::refuse(line(*row) + "column profile",
+                         "another profile or level than in the row before", "one in a dwell");
     }
     const auto found = spectra_.find({first.run, first.position});
+    said_.push_back(found != spectra_.end() || first.profile > 0 ? Said::stated
+                    : first.frequency_hz < 0                     ? Said::configuration
+                                                                 : Said::column);
     std::vector<Band> bands;
     if (found != spectra_.end()) {
         if (!found->second.profile.empty()) return add_random(found->second, line(first));
         bands = bands_of_lines(found->second.lines);
     } else if (first.profile > 0) {
         if (first.frequency_hz > 0)
-            throw std::runtime_error(line(first) + "column frequency_hz: found " +
-                                     std::to_string(first.frequency_hz) + " with profile '" +
-                                     profiles.at(first.profile - 1U) +
-                                     "', expected 0 under random vibration");
+            plan::refuse(line(first) + "column frequency_hz",
+                         std::to_string(first.frequency_hz) + " with profile '" +
+                             profiles.at(first.profile - 1U) + "'",
+                         "0 under random vibration");
         return add_random({{}, profiles.at(first.profile - 1U), {}, first.level_db},
                           line(first) + "column ");
-    } else if (!spectra_.empty() && first.frequency_hz < 0) {
-        throw std::runtime_error(line(first) + "run " + std::to_string(first.run) + ", position " +
-                                 std::to_string(first.position) +
-                                 ": found no spectrum in --spectra, expected one for every dwell");
     } else if (const double hz = first.frequency_hz < 0 ? configured_hz_ : first.frequency_hz;
                hz > 0) {
         bands = {{hz, 1, 0}};
@@ -197,12 +190,10 @@ void DwellKinds::add_random(const StatedSpectrum& of, const std::string& place) 
     const plan::StatedProfile stated = profile_of(of, rig_, place);
     const estimator::spectrum::Profile& profile = stated.profile;
     if (profile.axes.stated() || std::abs(std::abs(profile.direction[1]) - 1) > 1e-6)
-        throw std::runtime_error(place + "profile: found '" + profile.name +
-                                 "', which is not along the vertical, expected what a shaker "
-                                 "under the platform plays");
+        plan::refuse(place + "profile", "'" + profile.name + "', which is not along the vertical",
+                     "what a shaker under the platform plays");
     if (!profile.sines.empty())
-        throw std::runtime_error(place + "profile: found '" + profile.name +
-                                 "' with sines, expected a psd alone");
+        plan::refuse(place + "profile", "'" + profile.name + "' with sines", "a psd alone");
     AtPlatform there = at_platform(profile, stated.at, rig_);
     random_.push_back({there.moment(1, 1) * std::pow(10, of.level_db / 10),
                        estimator::spectrum::bandwidth_hz(there.bands),
@@ -221,6 +212,16 @@ std::size_t DwellKinds::kind_of(std::vector<Band> bands) {
     }
     kinds_.push_back({"", std::move(bands)});
     return kinds_.size() - 1;
+}
+
+void DwellKinds::put_at_rest(const std::vector<std::size_t>& dwells) {
+    for (const std::size_t d : dwells) of_dwell_[d].reset();
+    for (std::size_t k = kinds_.size(); k-- > 0;) {
+        if (std::ranges::count(of_dwell_, std::optional(k)) > 0) continue;
+        kinds_.erase(kinds_.begin() + static_cast<std::ptrdiff_t>(k));
+        for (auto& kind : of_dwell_)
+            if (kind && *kind > k) --*kind;
+    }
 }
 
 std::optional<std::size_t> DwellKinds::reference() const {

@@ -43,6 +43,15 @@ class DwellKinds {
     [[nodiscard]] const std::optional<std::size_t>& of(std::size_t dwell) const {
         return of_dwell_[dwell];
     }
+    /// Who says so.
+    enum class Said : unsigned char {
+        stated,        ///< --spectra, or the name of a profile: it shook with that
+        column,        ///< frequency_hz: a set-point, which may stand at rest, too
+        configuration  ///< nobody: it may have been at rest
+    };
+    [[nodiscard]] Said said_by(std::size_t dwell) const { return said_[dwell]; }
+    /// What the samples show of these dwells. A kind that no dwell is left of is gone.
+    void put_at_rest(const std::vector<std::size_t>& dwells);
     /// Profile at the platform of a dwell under random vibration.
     [[nodiscard]] const estimator::RandomVibration& random(std::size_t dwell) const {
         return random_[dwell];
@@ -60,6 +69,7 @@ class DwellKinds {
     std::vector<estimator::spectrum::Kind> kinds_;
     std::vector<std::optional<std::size_t>> of_dwell_;
     std::vector<estimator::RandomVibration> random_;
+    std::vector<Said> said_;
 };
 
 }  // namespace vibrig::tool

@@ -1,6 +1,4 @@
 // vibrig uncertainty: the budget of a result, and what would shrink it.
-#include <array>
-#include <cmath>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -73,16 +71,12 @@ std::size_t coefficient_number(const std::string& name) {
 /// Of each coefficient the parts, squared, over u squared. All of them and the correlations, which
 /// may be below 0, are 1.
 void draw_budget(const uncertainty::Assessment& assessed, const std::string& path) {
-    plot::Chart chart;
-    chart.title = "Parts of the combined uncertainty";
-    chart.x.label = "coefficient, as listed";
-    chart.y = plot::Axis("part of u squared");
+    plot::Chart chart{"Parts of the combined uncertainty", plot::Axis("coefficient, as listed"),
+                      plot::Axis("part of u squared")};
     chart.y.include(0);
     chart.y.include(1);
     for (const uncertainty::Leverage& of : uncertainty::leverages(assessed)) {
-        plot::Curve curve;
-        curve.name = of.input;
-        curve.look = plot::Look::dots;
+        plot::Curve curve{.name = of.input, .look = plot::Look::dots};
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
             const auto& c = assessed.coefficients[i];
             double square = 0;
@@ -94,9 +88,7 @@ void draw_budget(const uncertainty::Assessment& assessed, const std::string& pat
         chart.curves.push_back(std::move(curve));
         if (chart.curves.size() == 6) break;
     }
-    plot::Curve correlations;
-    correlations.name = "correlations";
-    correlations.look = plot::Look::dots;
+    plot::Curve correlations{.name = "correlations", .look = plot::Look::dots};
     bool any = false;
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto& c = assessed.coefficients[i];
@@ -143,7 +135,8 @@ void add_uncertainty(CLI::App& app, int& exit_code) {
                        "defaults apply, of a campaign its own");
     command.add_option("--coefficient", options.coefficient,
                        "the whole budget of this one only, such as D_IIx");
-    command.add_option("--plot", options.plot, "an SVG file, or a folder: the parts of the budget");
+    command.add_option("--plot", options.plot, "an SVG file, or a folder: the parts of the budget")
+        ->check(proto::charts());
     command.add_flag("--monte-carlo", options.monte_carlo,
                      "check the combined uncertainty by drawing the inputs (JCGM 101)");
     command.add_flag("--json", options.json, "print everything as JSON");

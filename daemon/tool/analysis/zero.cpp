@@ -12,8 +12,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/analysis/zero_input.hpp"
-#include "daemon/tool/analysis/zero_output.hpp"
+#include "daemon/tool/analysis/zero_command.hpp"
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
@@ -275,7 +274,8 @@ void add_common(CLI::App& command, Options& o) {
     add_number(command, "--vibration-limit", s.vibration_limit_g,
                "g, standard deviation within 1 s (0.01)", kAboveZero, 10);
     command.add_flag("--json", o.json, "print the result as JSON");
-    command.add_option("--plot", o.plot, "an SVG file, or a folder: one for each way up");
+    command.add_option("--plot", o.plot, "an SVG file, or a folder: one for each way up")
+        ->check(proto::charts());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "daemon/tool/analysis/zero_input.hpp"
+#include "daemon/tool/analysis/zero_command.hpp"
 
 #include <cmath>
 #include <fstream>

@@ -1,8 +1,6 @@
-#include "daemon/tool/analysis/zero_output.hpp"
+#include "daemon/tool/analysis/zero_command.hpp"
 
 #include <cmath>
-#include <iomanip>
-#include <optional>
 
 #include "daemon/results/text_line.hpp"
 #include "proto/json_number.hpp"

@@ -8,6 +8,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/plan_study.hpp"
 #include "daemon/tool/design/plan_turntable.hpp"
+#include "proto/durable_file.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::planner {
@@ -17,7 +18,6 @@ namespace {
 struct Options {
     PlanRequest request;
     std::vector<double> outer, inner, azimuth;
-    double dwell = 0, settle = 0, ramp = 0;
     std::string plot;
     std::string output;
     bool json = false;
@@ -52,9 +52,6 @@ void check(Options& options, bool blocks) {
         require(std::isfinite(target) && target >= 0, "--targets: found " + std::to_string(target),
                 "standard errors of bias, linear and quadratic terms, 0 for none");
     }
-    if (options.dwell > 0) request.dwell_s = options.dwell;
-    if (options.settle > 0) request.settle_s = options.settle;
-    if (options.ramp > 0) request.ramp_s = options.ramp;
     require((request.survey.mount.empty() && request.survey.attitudes.empty()) ||
                 request.survey.asked(),
             "found --mount or --attitude alone",
@@ -75,7 +72,7 @@ int run(Options& options, bool blocks) {
         result =
             options.request.survey.asked() ? survey_study(options.request) : study(options.request);
     }
-    if (!options.output.empty()) plot::write_file(options.output, plan_json(result) + "\n");
+    if (!options.output.empty()) proto::write_output(options.output, plan_json(result) + "\n");
     if (!options.plot.empty())
         plot::write_pictures(options.plot,
                              {{"sphere", plan_picture(result, frame_of(options.request))}});
@@ -96,7 +93,7 @@ int run_turntable(Options& options) {
     request.without = options.request.without;
     request.seed = options.request.seed;
     const TurntablePlan plan = turntable_plan(request);
-    if (!options.output.empty()) plot::write_file(options.output, turntable_csv(plan));
+    if (!options.output.empty()) proto::write_output(options.output, turntable_csv(plan));
     std::cout << (options.json ? turntable_json(plan) + "\n" : turntable_table(plan));
     if (plan.refusal.empty()) return 0;
     std::cerr << "refused: " << plan.refusal << '\n';
@@ -197,9 +194,9 @@ void add_time(CLI::App& command, Options& options) {
     PlanRequest& request = options.request;
     command.add_flag("--time-costs", request.time_costs,
                      "compare plans per time, ramps included, not per run");
-    add_number(command, "--dwell", options.dwell, "s of one run (100)", kAboveZero, 1e6);
-    add_number(command, "--settle", options.settle, "s after the ramp (3)", kAboveZero, 1e6);
-    add_number(command, "--ramp", options.ramp, "s to the level, and back (2)", kAboveZero, 1e6);
+    add_number(command, "--dwell", request.dwell_s, "s of one run (100)", kAboveZero, 1e6);
+    add_number(command, "--settle", request.settle_s, "s after the ramp (3)", kAboveZero, 1e6);
+    add_number(command, "--ramp", request.ramp_s, "s to the level, and back (2)", kAboveZero, 1e6);
     add_number(command, "--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)", kAboveZero,
                1e6);
     command
@@ -239,7 +236,8 @@ void add_plan(CLI::App& app, int& exit_code) {
     command->add_option("--seed", request.seed, "of the random starts (1)")->check(proto::whole());
     command->add_option("--config", request.config, "configuration file (TOML) of the rig");
     command->add_option("-o,--output", options->output, "plan file for vibrigd ([campaign] plan)");
-    command->add_option("--plot", options->plot, "an SVG file, or a folder: the directions");
+    command->add_option("--plot", options->plot, "an SVG file, or a folder: the directions")
+        ->check(proto::charts());
     command->add_flag("--json", options->json, "print the plan as JSON");
     planner::add_turntable(*command, *options);
     command->footer(

@@ -13,6 +13,7 @@
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
+#include "estimator/spectrum/profile.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -48,6 +49,7 @@ class Study {
         }
         if (!request.forbidden.empty()) limits_.forbidden = positions_in(request.forbidden);
         terms_ = terms_without(request.without);
+        if (request.config.empty() && !request.evaluate.empty()) take_mount_of_plan();
         out_.transmission = c_.estimator.transmission;
         out_.frequency_hz = c_.estimator.frequency_hz;
         out_.dwell_s = timing_.dwell_s;
@@ -79,6 +81,21 @@ class Study {
     }
 
   private:
+    /// No configuration says what stands between table and platform: then the plan may.
+    void take_mount_of_plan() {
+        const auto said = plan::read_plan_mount(request_.evaluate);
+        if (!said) return;
+        auto& mount = c_.spectrum.mount;
+        auto& reference = c_.estimator.transmission;
+        const double at_hz = said->at_hz > 0 ? said->at_hz : c_.estimator.frequency_hz;
+        mount = {said->transmission >= 1 && said->at_hz == 0, {}, {}};
+        if (!mount.hard)
+            mount.pads = estimator::spectrum::pads_with(at_hz, std::min(said->transmission, 0.999),
+                                                        c_.spectrum.pads_damping);
+        reference = said->at_hz > 0
+                        ? mount.transmission(c_.estimator.frequency_hz).value_or(reference)
+                        : said->transmission;
+    }
     [[nodiscard]] std::vector<Vec3> positions_in(const std::string& path) const {
         auto positions = plan::read_positions(path);
         for (Vec3& position : positions) position = to_readings(c_.estimator, position);

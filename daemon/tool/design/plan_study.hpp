@@ -9,7 +9,6 @@
 #include "daemon/plan/forecast.hpp"
 #include "daemon/plan/plan_file.hpp"
 #include "daemon/results/text_line.hpp"
-#include "daemon/tool/design/plan_uncertainty.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"
@@ -18,6 +17,8 @@
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/spectrum/sweep_bounds.hpp"
 #include "estimator/spectrum/sweep_plan.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/balanced_order.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -100,10 +101,15 @@ struct Sweeps {
     std::array<double, 6> seen{};  ///< estimator::spectrum::products_seen()
 };
 
+/// What a plan allows with the inputs as they are declared, before anything is shaken.
+struct PlanUncertainty {
+    estimator::uncertainty::Assessment assessed;  ///< without noise, typical coefficients
+    estimator::uncertainty::OrderMerit merit;
+};
+
 struct PlanStudy {
     std::vector<PlanRun> runs;        ///< in the order they are to be run
     planning::Evaluation evaluation;  ///< unit noise
-    std::vector<std::string> undetermined_candidates;
     double d_efficiency = 0, bound = 0, a_efficiency = 0;
     double e_efficiency = 0;  ///< at least
     double optimum_gap = 0;   ///< max d - p of the optimum compared with
@@ -129,6 +135,11 @@ struct PlanStudy {
 /// Times of one dwell, by the request or else the configuration.
 [[nodiscard]] planning::Timing timing_of(const PlanRequest& request,
                                          const configuration::Configuration& c);
+/// `visits` in their order, levels at the platform; `period_s` between samples. Coefficients as
+/// those of Table 2 of Tang et al. 2009: 1 deg/h, 1 deg/h/g, 0.03 deg/h/g^2.
+[[nodiscard]] PlanUncertainty plan_uncertainty(const estimator::Settings& settings,
+                                               const std::vector<planning::Visit>& visits,
+                                               const planning::Timing& timing, double period_s);
 /// Between samples, s.
 [[nodiscard]] inline double period_of(const configuration::Configuration& c) {
     return static_cast<double>(c.assembler.sample_period) * 1e-9;

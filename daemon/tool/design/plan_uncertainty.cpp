@@ -1,9 +1,8 @@
-#include "daemon/tool/design/plan_uncertainty.hpp"
-
 #include <algorithm>
 #include <numeric>
 #include <string_view>
 
+#include "daemon/tool/design/plan_study.hpp"
 #include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"
@@ -12,7 +11,6 @@
 namespace vibrig::tool::planner {
 
 namespace uncertainty = estimator::uncertainty;
-namespace planning = estimator::plan;
 
 namespace {
 

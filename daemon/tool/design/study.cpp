@@ -1,6 +1,5 @@
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -49,6 +48,7 @@ study::Shard shard_of(const std::string& text) {
 int plan(const StudyOptions& o) {
     std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a disk that is full
     const auto folder = study::plan_study(o.file, o.folder, o.instruction_set);
+    for (const std::string& warning : folder.study.warnings) std::cerr << warning << '\n';
     if (folder.study.kind != "campaigns" && !o.json) {
         std::cout << o.folder << ": " << folder.tasks()
                   << (folder.study.kind == "recordings" ? " recordings" : " blocks of 10000 trials")
@@ -103,10 +103,10 @@ int run(const StudyOptions& o) {
 
 int status(const StudyOptions& o) {
     const auto folder = study::open_study(o.folder);
-    const auto found = study::status_of(folder);
-    std::cout << (o.json ? proto::json_text(studies::status_json(found)) + "\n"
-                         : studies::status_text(found));
-    return found.contradictions.empty() && found.foreign.empty() ? 0 : kNo;
+    const auto status = study::status_of(folder);
+    std::cout << (o.json ? proto::json_text(studies::status_json(status)) + "\n"
+                         : studies::status_text(status));
+    return status.found.contradictions.empty() && status.found.foreign.empty() ? 0 : kNo;
 }
 
 void tell(const char* what, const std::vector<std::string>& lines) {
@@ -114,8 +114,8 @@ void tell(const char* what, const std::vector<std::string>& lines) {
 }
 
 void write_result(const StudyOptions& o, const Json& result) {
-    if (!o.output.empty()) plot::write_file(o.output, proto::json_text(result, 1) + "\n");
-    if (!o.csv.empty()) plot::write_file(o.csv, studies::result_csv(result));
+    if (!o.output.empty()) proto::write_output(o.output, proto::json_text(result, 1) + "\n");
+    if (!o.csv.empty()) proto::write_output(o.csv, studies::result_csv(result));
     if (!o.hdf5.empty()) {
         proto::OutputFile file(o.hdf5);
         std::filesystem::remove(file.place());  // HDF5 makes it anew
@@ -151,26 +151,26 @@ int merge(const StudyOptions& o) {
     study::Merged merged(folder);
     study::Reduction reduction(folder);
     for (study::TaskRecord record; merged.next(record);) reduction.add(record.index, record.bytes);
-    tell("unfinished: ", merged.unfinished());
-    tell("damaged: ", merged.damaged());
-    tell("foreign: ", merged.foreign());
-    tell("contradictory: ", merged.contradictions());
-    if (merged.missing_count() > 0) {
-        std::cerr << "missing: " << merged.missing_count() << " of " << folder.tasks()
-                  << " tasks: " << studies::ranges_text(merged.missing(), merged.missing_count())
-                  << '\n';
-    } else if (!merged.damaged().empty()) {
+    const study::MergeFindings& found = merged.found();
+    tell("unfinished: ", found.unfinished);
+    tell("damaged: ", found.damaged);
+    tell("foreign: ", found.foreign);
+    tell("contradictory: ", found.contradictions);
+    if (found.missing_count > 0) {
+        std::cerr << "missing: " << found.missing_count << " of " << folder.tasks()
+                  << " tasks: " << studies::missing_text(found) << '\n';
+    } else if (!found.damaged.empty()) {
         std::cerr
             << "what was damaged another part has: nothing is missing; remove what is damaged\n";
     }
-    bool wrong = (!merged.damaged().empty() && !o.partial) || !merged.foreign().empty() ||
-                 !merged.contradictions().empty();
-    if (merged.missing_count() > 0 && !o.partial) {
+    bool wrong = (!found.damaged.empty() && !o.partial) || !found.foreign.empty() ||
+                 !found.contradictions.empty();
+    if (found.missing_count > 0 && !o.partial) {
         std::cerr << "no result; `vibrig study run " << o.folder
                   << "` computes what is missing, --partial takes what there is\n";
         return kNo;
     }
-    write_result(o, reduction.result(merged.missing_count()));
+    write_result(o, reduction.result(found.missing_count));
     if (o.compact) {
         const study::Compaction done = study::compact(folder);
         tell("kept: ", done.kept);
@@ -228,7 +228,8 @@ void add_merge(CLI::App& study, const std::shared_ptr<StudyOptions>& o, int& exi
     command->add_option("-o,--output", o->output, "write the result as JSON to this file");
     command->add_option("--csv", o->csv, "write a row for each coefficient and point");
     command->add_option("--hdf5", o->hdf5, "write tables of points and coefficients");
-    command->add_option("--plot", o->plot, "write charts (SVG) to this folder");
+    command->add_option("--plot", o->plot, "write charts (SVG) to this folder")
+        ->check(proto::charts(false));
     command->add_flag("--partial", o->partial, "what there is, if something is missing");
     command->add_flag("--compact", o->compact, "afterwards make one part of the closed ones");
     command->footer(

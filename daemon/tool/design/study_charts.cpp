@@ -9,6 +9,7 @@
 #include "daemon/study/statistics.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "proto/durable_file.hpp"
 
 namespace vibrig::tool::studies {
 
@@ -170,10 +171,10 @@ std::string write_campaign_charts(const Json& result, const std::string& folder)
     const Json& points = result.at("points");
     if (std::ranges::none_of(points, determined)) return kNothing;
     plot::make_folder(folder);
-    plot::write_file(folder + "/rms-z-grid.svg", grid_chart(result).svg());
+    proto::write_output(folder + "/rms-z-grid.svg", grid_chart(result).svg());
     for (const auto& [name, unit] : kUnits)
-        plot::write_file(folder + "/rms-error-grid-" + name + ".svg",
-                         error_chart(result, unit).svg());
+        proto::write_output(folder + "/rms-error-grid-" + name + ".svg",
+                            error_chart(result, unit).svg());
     for (std::size_t i = 0; i < std::min(points.size(), kMostCharts); ++i) {
         const Json& point = points[i];
         const std::string name =
@@ -182,13 +183,13 @@ std::string write_campaign_charts(const Json& result, const std::string& folder)
             coefficient_chart(point, "rms of error over claimed u", "rms z",
                               {{"all inputs", "/all/rms_z"}, {"noise alone", "/noise/rms_z"}});
         z.curves.push_back(plot::level_line("theory", 1, 30, 1));
-        plot::write_file(folder + "/rms-z" + name + ".svg", z.svg());
+        proto::write_output(folder + "/rms-z" + name + ".svg", z.svg());
         plot::Chart within = coefficient_chart(
             point, "share of errors within 1.96 u", "coverage",
             {{"all inputs", "/all/coverage/95"}, {"noise alone", "/noise/coverage/95"}});
         within.curves.push_back(plot::level_line("theory", 1, 30, 0.95));
-        plot::write_file(folder + "/coverage" + name + ".svg", within.svg());
-        plot::write_file(folder + "/nees" + name + ".svg", nees_chart(point).svg());
+        proto::write_output(folder + "/coverage" + name + ".svg", within.svg());
+        proto::write_output(folder + "/nees" + name + ".svg", nees_chart(point).svg());
     }
     return points.size() > kMostCharts
                ? first_of(kMostCharts, points.size(), "points") +
@@ -239,8 +240,8 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
     coverage.y = plot::Axis("share");
     coverage.curves = {std::move(within)};
     coverage.notes = {note};
-    plot::write_file(folder + "/rms-z.svg", z.svg());
-    plot::write_file(folder + "/coverage.svg", coverage.svg());
+    proto::write_output(folder + "/rms-z.svg", z.svg());
+    proto::write_output(folder + "/coverage.svg", coverage.svg());
 
     plot::Curve largest{.name = "largest of 30", .look = plot::Look::dots};
     for (std::size_t k = 0; k < std::min(compared.size(), kMostCompared); ++k) {
@@ -257,7 +258,7 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
                  " are in the chart of E_n";
         each.notes = {remark};
     }
-    plot::write_file(folder + "/e-n.svg", each.svg());
+    proto::write_output(folder + "/e-n.svg", each.svg());
     return remark;
 }
 
@@ -297,8 +298,8 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
     ends.curves = {std::move(off[0]), std::move(off[1]), plot::level_line("tolerance", 1, 30, 1),
                    plot::level_line("", 1, 30, -1)};
     u.notes = ends.notes = {note};
-    plot::write_file(folder + "/rms-z.svg", u.svg());
-    plot::write_file(folder + "/interval-ends.svg", ends.svg());
+    proto::write_output(folder + "/rms-z.svg", u.svg());
+    proto::write_output(folder + "/interval-ends.svg", ends.svg());
     return "";
 }
 

@@ -8,7 +8,6 @@
 #include "daemon/record/hdf5.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/serve/render.hpp"
-#include "daemon/tool/design/study_recordings.hpp"
 
 namespace vibrig::tool::studies {
 
@@ -163,34 +162,34 @@ void write_hdf5(const Json& result, const std::string& path) {
     file.close();
 }
 
-std::string ranges_text(const std::vector<std::pair<std::uint64_t, std::uint64_t>>& ranges,
-                        std::uint64_t count) {
+std::string missing_text(const study::MergeFindings& found) {
     std::string text;
     std::uint64_t listed = 0;
-    for (const auto& [first, last] : ranges) {
-        if (&first - &ranges.front().first >= static_cast<std::ptrdiff_t>(2 * kMostRanges)) break;
+    for (std::size_t i = 0; i < std::min(found.missing.size(), kMostRanges); ++i) {
+        const auto& [first, last] = found.missing[i];
         text += (text.empty() ? "" : ", ") + std::to_string(first) +
                 (last > first ? " to " + std::to_string(last) : "");
         listed += last - first + 1;
     }
-    return listed < count ? text + " and " + std::to_string(count - listed) + " more" : text;
+    const std::uint64_t more = found.missing_count - listed;
+    return more > 0 ? text + " and " + std::to_string(more) + " more" : text;
 }
 
 std::string status_text(const study::StudyStatus& s) {
     std::string text =
         printed("%lu of %lu tasks done, %lu failed; %lu parts", s.done, s.tasks, s.failed, s.parts);
-    if (s.duplicates > 0) text += printed(", %lu tasks done twice", s.duplicates);
-    text += s.missing == 0 ? "\n" : "; left: " + left_text(s.left_s) + "\n";
+    if (s.found.duplicates > 0) text += printed(", %lu tasks done twice", s.found.duplicates);
+    text += s.found.missing_count == 0 ? "\n" : "; left: " + left_text(s.left_s) + "\n";
     for (const auto& part : s.running)
         text +=
             printed("running: shard %lu of %lu on %s, process %ld: %lu tasks, written %.0f s ago\n",
                     part.shard.number, part.shard.of, part.host.c_str(), part.pid, part.records,
                     part.age_s);
-    for (const auto& line : s.damaged) text += "damaged: " + line + "\n";
-    for (const auto& line : s.foreign) text += "foreign: " + line + "\n";
-    for (const auto& line : s.contradictions) text += "contradictory: " + line + "\n";
-    if (s.missing > 0 && s.running.empty())
-        text += "missing: tasks " + ranges_text(s.missing_ranges, s.missing) + "\n";
+    for (const auto& line : s.found.damaged) text += "damaged: " + line + "\n";
+    for (const auto& line : s.found.foreign) text += "foreign: " + line + "\n";
+    for (const auto& line : s.found.contradictions) text += "contradictory: " + line + "\n";
+    if (s.found.missing_count > 0 && s.running.empty())
+        text += "missing: tasks " + missing_text(s.found) + "\n";
     return text;
 }
 
@@ -207,13 +206,13 @@ Json status_json(const study::StudyStatus& s) {
     return {{"tasks", s.tasks},
             {"done", s.done},
             {"failed", s.failed},
-            {"missing", s.missing},
-            {"duplicates", s.duplicates},
+            {"missing", s.found.missing_count},
+            {"duplicates", s.found.duplicates},
             {"parts", s.parts},
             {"running", running},
-            {"damaged", s.damaged},
-            {"foreign", s.foreign},
-            {"contradictory", s.contradictions},
+            {"damaged", s.found.damaged},
+            {"foreign", s.found.foreign},
+            {"contradictory", s.found.contradictions},
             {"left_s", s.left_s < 0 ? Json(nullptr) : Json(s.left_s)}};
 }
 

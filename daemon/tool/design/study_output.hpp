@@ -20,6 +20,16 @@ void write_hdf5(const nlohmann::ordered_json& result, const std::string& path);
 [[nodiscard]] std::string write_charts(const nlohmann::ordered_json& result,
                                        const std::string& folder);
 
+// The same, of recordings that were identified anew.
+[[nodiscard]] std::string recordings_table(const nlohmann::ordered_json& result);
+/// One row for each coefficient of each recording.
+[[nodiscard]] std::string recordings_csv(const nlohmann::ordered_json& result);
+void write_recordings_hdf5(const nlohmann::ordered_json& result, const std::string& path);
+// And of the proof of a budget.
+[[nodiscard]] std::string propagation_table(const nlohmann::ordered_json& result);
+[[nodiscard]] std::string propagation_csv(const nlohmann::ordered_json& result);
+void write_propagation_hdf5(const nlohmann::ordered_json& result, const std::string& path);
+
 /// NaN if there is none.
 [[nodiscard]] double number_at(const nlohmann::ordered_json& json, const char* pointer);
 /// With a comma before it; NaN leaves the field empty.
@@ -32,9 +42,8 @@ void write_hdf5(const nlohmann::ordered_json& result, const std::string& path);
 [[nodiscard]] std::string status_text(const study::StudyStatus& status);
 [[nodiscard]] nlohmann::ordered_json status_json(const study::StudyStatus& status);
 
-/// "0 to 4, 7, 9 to 12 and 3 more"
-[[nodiscard]] std::string ranges_text(
-    const std::vector<std::pair<std::uint64_t, std::uint64_t>>& ranges, std::uint64_t count);
+/// Tasks: "0 to 4, 7, 9 to 12 and 3 more"
+[[nodiscard]] std::string missing_text(const study::MergeFindings& found);
 
 /// How far a run is: a bar on a terminal, else a line now and then; on standard error.
 class RunDisplay {

@@ -5,7 +5,6 @@
 #include "daemon/record/hdf5.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/study_output.hpp"
-#include "daemon/tool/design/study_recordings.hpp"
 
 namespace vibrig::tool::studies {
 

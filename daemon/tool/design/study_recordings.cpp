@@ -1,5 +1,3 @@
-#include "daemon/tool/design/study_recordings.hpp"
-
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>

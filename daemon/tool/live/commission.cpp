@@ -1,15 +1,12 @@
 // The dialogue of commissioning: shows what the daemon says, passes on what a person answers. What
 // moves is decided in the daemon, so that a tool that dies moves nothing.
 #include <poll.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <iterator>
@@ -20,18 +17,15 @@
 #include <string_view>
 #include <thread>
 
-#include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/shaker_parts.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/journal/latches.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/answers.hpp"
 #include "daemon/tool/live/commission_client.hpp"
-#include "daemon/tool/live/commission_record.hpp"
 #include "daemon/tool/live/key_by_key.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
-#include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
@@ -47,11 +41,8 @@ constexpr std::size_t kColumns = 79;
 
 std::string commission_command(serve::Client& client, const std::string& by,
                                const CommissionJson& what) {
-    v1::Command command;
-    command.set_kind(v1::Command::commission);
-    command.set_by(by);
-    command.set_argument(what.dump());
-    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
+    const serve::Reply reply = client.post(
+        "/api/v1/commands", json_of(command_of(v1::Command::commission, by, what.dump())));
     if (reply.status == 409 || reply.status == 403) throw CommissionRefused(problem_of(reply));
     v1::CommandReply answer;
     parse_answer(reply, answer);
@@ -307,9 +298,7 @@ int commission(const CommissionOptions& options) {
         return std::ranges::find(kShaker, part) != kShaker.end();
     };
     const auto shaker = std::ranges::count_if(options.parts, of_shaker);
-    if (shaker > 0 && shaker == std::ssize(options.parts))
-        return commission_shaker({options.at, options.by, options.parts, options.display,
-                                  options.reference_g, options.json, options.yes});
+    if (shaker > 0 && shaker == std::ssize(options.parts)) return commission_shaker(options);
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
     bool gyros = false;

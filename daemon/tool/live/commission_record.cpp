@@ -1,5 +1,4 @@
-#include "daemon/tool/live/commission_record.hpp"
-
+// What `vibrig commission` writes: the configuration, and the record by way of the daemon.
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/person_signature.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/tool/live/commission_client.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/text.hpp"
 

@@ -59,22 +59,17 @@ drivers::ShakerSettings settings_of(const RegisterOptions& options) {
 /// A link without a way to write.
 class ReadingLink {
   public:
-    explicit ReadingLink(const RegisterOptions& options) : link_(settings_of(options)) {
-        std::string why;
-        if (link_.connect(why) != drivers::ModbusLink::Connection::open)
-            throw std::runtime_error(link_.name() + ": " + why);
-    }
+    explicit ReadingLink(const RegisterOptions& options) : link_(settings_of(options)) { open(); }
 
     /// By function 17; empty: it does not say.
     std::string device() {
-        std::string text, why;
+        std::string text;
         std::this_thread::sleep_for(kBetweenRequests);
         const auto reply = link_.identify(text);
         if (reply.ok()) return text;
         if (reply.kind == drivers::ReplyKind::exception) return {};
         link_.close();  // a late reply would be taken for the next one
-        if (link_.connect(why) != drivers::ModbusLink::Connection::open)
-            throw std::runtime_error(link_.name() + ": " + why);
+        open();
         return {};
     }
 
@@ -100,6 +95,12 @@ class ReadingLink {
     [[nodiscard]] const std::string& name() const noexcept { return link_.name(); }
 
   private:
+    void open() {
+        std::string why;
+        if (link_.connect(why) != drivers::ModbusLink::Connection::open)
+            throw std::runtime_error(link_.name() + ": " + why);
+    }
+
     drivers::ModbusLink link_;
 };
 

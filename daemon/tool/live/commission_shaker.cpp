@@ -1,6 +1,5 @@
 // The shaker's parts of the commissioning record: a run at 0 g, there each button of the emergency
 // stop pressed once, then a proof of the safe state, all made by the daemon.
-#include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
 #include <iostream>
@@ -13,7 +12,7 @@ namespace vibrig::tool {
 
 namespace {
 
-bool person_agrees(const ShakerCommission& options, std::ostream& out, const std::string& asked) {
+bool person_agrees(const CommissionOptions& options, std::ostream& out, const std::string& asked) {
     print_wrapped(out, "? " + asked + " [yes or no]");
     if (options.yes) return true;
     for (std::string line; out << "> " << std::flush, std::getline(std::cin, line);) {
@@ -25,26 +24,23 @@ bool person_agrees(const ShakerCommission& options, std::ostream& out, const std
 }
 
 /// The trip of a button that was pressed on purpose.
-void acknowledge_press(serve::Client& client, const ShakerCommission& options, std::ostream& out,
+void acknowledge_press(serve::Client& client, const CommissionOptions& options, std::ostream& out,
                        const std::string& button) {
     if (!person_agrees(
             options, out,
             "The trip of \"" + button + "\" is latched. Acknowledge it, " + options.by + "?"))
         throw CommissionRefused("not acknowledged: vibrig ack trip --by NAME, then go on");
-    v1::Command command;
-    command.set_kind(v1::Command::acknowledge);
-    command.set_argument("trip");
-    command.set_by(options.by);
+    const auto command = command_of(v1::Command::acknowledge, options.by, "trip");
     if (const auto why = refusal_of(client, command); !why.empty())
         throw CommissionRefused(why + ": the buttons pressed so far are kept, go on after it");
 }
 
-bool asked_for(const ShakerCommission& options, const char* part) {
+bool asked_for(const CommissionOptions& options, const char* part) {
     return std::ranges::find(options.parts, part) != options.parts.end();
 }
 
 /// Each while the controller runs at 0 g. Empty: they have passed.
-std::string press_buttons(serve::Client& client, const ShakerCommission& options,
+std::string press_buttons(serve::Client& client, const CommissionOptions& options,
                           const CommissionJson& left, std::ostream& out) {
     for (const std::string button : left) {
         if (!person_agrees(options, out,
@@ -62,7 +58,7 @@ std::string press_buttons(serve::Client& client, const ShakerCommission& options
 
 /// What stops it is tried at 0 g, then it shakes. Each is an arming of its own. Empty: it has
 /// passed.
-std::string prove_all(serve::Client& client, const ShakerCommission& options,
+std::string prove_all(serve::Client& client, const CommissionOptions& options,
                       const CommissionJson& record, std::ostream& out) {
     if (record["ran_at_zero"] != true) {
         if (!person_agrees(options, out,
@@ -89,7 +85,7 @@ std::string prove_all(serve::Client& client, const ShakerCommission& options,
 
 }  // namespace
 
-int commission_shaker(const ShakerCommission& options) {
+int commission_shaker(const CommissionOptions& options) {
     std::ostream& out = options.json ? std::cerr : std::cout;
     serve::Client client(options.at);
     auto state = commission_state(client, options.by, 0);

@@ -1,6 +1,5 @@
 // The registers that a configuration states, tried on the controller: the only command that writes
 // to a shaker beside the daemon, and never while one has the rig.
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <iostream>

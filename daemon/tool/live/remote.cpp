@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
-#include <memory>
 #include <thread>
 
 #include "daemon/serve/render.hpp"
@@ -64,6 +63,12 @@ std::string painted(const std::string& line, bool head, v1::Campaign::State stat
         return colour::bad(line);
     if (line.starts_with("why: ") || has("SILENT") || has(": DOWN, ")) return colour::warning(line);
     return line;
+}
+
+google::protobuf::util::Status parsed(const std::string& json, google::protobuf::Message& message) {
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;  // a newer daemon may say more
+    return google::protobuf::util::JsonStringToMessage(json, &message, options);
 }
 
 int show_status(const StatusOptions& options) {
@@ -153,12 +158,10 @@ int self_test(const TestOptions& options) {
                              options.json);
     serve::Client client(options.at);
     if (!options.by.empty()) {
-        v1::Command command;
-        command.set_kind(v1::Command::selftest);
-        command.set_by(options.by);
-        command.set_argument(std::string(options.at_zero ? "at_zero" : "") +
-                             (options.at_zero && options.emergency_stop ? " " : "") +
-                             (options.emergency_stop ? "emergency_stop" : ""));
+        const auto command = command_of(v1::Command::selftest, options.by,
+                                        std::string(options.at_zero ? "at_zero" : "") +
+                                            (options.at_zero && options.emergency_stop ? " " : "") +
+                                            (options.emergency_stop ? "emergency_stop" : ""));
         wait_for_rest(client);
         const auto before = ask_status(client);
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
@@ -200,13 +203,14 @@ void wait_for_shaker(serve::Client& client) {
 }
 
 int send_command(const CommandOptions& options) {
-    v1::Command command;
-    command.set_kind(options.kind);
-    command.set_by(options.by);
-    command.set_argument(options.argument);
+    if (options.kind == v1::Command::acknowledge && options.argument.empty())
+        throw std::runtime_error(
+            "what: found nothing to acknowledge, expected trip, shaker, or the name of an alarm or "
+            "of what is latched, as `vibrig status` has them");
     serve::Client client(options.at);
     if (options.kind == v1::Command::arm) wait_for_rest(client);
-    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
+    const serve::Reply reply = client.post(
+        "/api/v1/commands", json_of(command_of(options.kind, options.by, options.argument)));
     if (options.json) std::cout << reply.body << '\n';
     if (reply.status == 200) {
         v1::CommandReply answer;
@@ -245,8 +249,8 @@ void add_order(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char
     if (kind == v1::Command::acknowledge) {
         command
             .add_option("what", options.argument,
-                        "What is acknowledged, as `vibrig status` names it")
-            ->required()
+                        "What is acknowledged: trip, shaker, or the name of an alarm or of what is "
+                        "latched, as `vibrig status` has them")
             ->check(one_line("what `vibrig status` names"));
         example += " trip";
     }
@@ -273,6 +277,14 @@ CLI::Validator one_line(const std::string& what) {
         "");
 }
 
+v1::Command command_of(v1::Command::Kind kind, const std::string& by, const std::string& argument) {
+    v1::Command command;
+    command.set_kind(kind);
+    command.set_by(by);
+    command.set_argument(argument);
+    return command;
+}
+
 std::string json_of(const v1::Command& command) {
     std::string json;
     // protobuf would say so by itself, too, on standard error.
@@ -288,12 +300,7 @@ bool is_no(int status) { return status == 403 || status == 409 || status == 429;
 
 std::string problem_of(const serve::Reply& reply) {
     v1::Problem problem;
-    google::protobuf::util::JsonParseOptions options;
-    options.ignore_unknown_fields = true;
-    if (google::protobuf::util::JsonStringToMessage(reply.body, &problem, options).ok() &&
-        !problem.detail().empty()) {
-        return problem.detail();
-    }
+    if (parsed(reply.body, problem).ok() && !problem.detail().empty()) return problem.detail();
     return "HTTP status " + std::to_string(reply.status);
 }
 
@@ -323,13 +330,9 @@ std::string default_socket() {
 
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
     if (reply.status != 200) throw serve::ClientError("vibrigd: " + problem_of(reply));
-    google::protobuf::util::JsonParseOptions options;
-    options.ignore_unknown_fields = true;  // a newer daemon may say more
-    const auto parsed = google::protobuf::util::JsonStringToMessage(reply.body, &message, options);
-    if (!parsed.ok()) {
+    if (const auto found = parsed(reply.body, message); !found.ok())
         throw serve::ClientError("the daemon's answer is not as expected: " +
-                                 std::string(parsed.message()));
-    }
+                                 std::string(found.message()));
 }
 
 v1::Status ask_status(serve::Client& client) {
@@ -390,6 +393,8 @@ void add_remote(CLI::App& app, int& exit_code) {
         "1 when that is not valid, or when it was aborted or tripped");
     watching.add_flag("--strict", watch_options.strict,
                       "With --until-finished: a doubtful result is a no as well");
+    watching.add_flag("--json", watch_options.json,
+                      "One JSON object per line (vibrig.v1.Status), each time it is asked");
     add_number(watching, "--interval", watch_options.interval_s, "Time between two queries, s",
                0.05, 3600)
         ->capture_default_str();
@@ -420,17 +425,11 @@ std::string refusal_of(serve::Client& client, const v1::Command& command) {
 
 std::string prove_safe_state(serve::Client& client, const std::string& by,
                              const std::string& argument, std::ostream& out) {
-    v1::Command command;
-    command.set_kind(v1::Command::selftest);
-    command.set_by(by);
-    command.set_argument("attended " + argument);
     wait_for_rest(client);
     const auto before = ask_status(client);
+    const auto command = command_of(v1::Command::selftest, by, "attended " + argument);
     if (auto why = refusal_of(client, command); !why.empty()) return why;
-    v1::Command attending;
-    attending.set_kind(v1::Command::commission);
-    attending.set_by(by);
-    attending.set_argument(R"({"do":"attend"})");
+    const auto attending = command_of(v1::Command::commission, by, R"({"do":"attend"})");
     const auto proof = show_loop_check(out, client, before, [&] {
         static_cast<void>(client.post("/api/v1/commands", json_of(attending)));
     });

@@ -23,6 +23,8 @@ void add_socket(CLI::App& command, serve::Address& at);
 [[nodiscard]] std::string problem_of(const serve::Reply& reply);
 /// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
 [[nodiscard]] bool is_no(int status);
+[[nodiscard]] v1::Command command_of(v1::Command::Kind kind, const std::string& by,
+                                     const std::string& argument = "");
 /// As the daemon takes it. Throws serve::ClientError where a name is not UTF-8.
 [[nodiscard]] std::string json_of(const v1::Command& command);
 /// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
@@ -48,6 +50,7 @@ struct WatchOptions {
     serve::Address at;
     bool until_finished = false;
     bool strict = false;  ///< a doubtful result is a no, too
+    bool json = false;    ///< a status as JSON, one line for each query
     double interval_s = 1.0;
 };
 /// Returns the exit code.

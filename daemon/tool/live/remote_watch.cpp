@@ -100,12 +100,12 @@ bool is_under_way(v1::Campaign::State state) {
 class Watch {
   public:
     explicit Watch(const WatchOptions& options) : options_(options), client_(options.at) {
-        if (isatty(STDOUT_FILENO) != 0) screen_.emplace();
+        if (!options.json && isatty(STDOUT_FILENO) != 0) screen_.emplace();
     }
 
     int run() {
         // Nobody there at the beginning is an error; nobody there later may come back.
-        v1::Status status = ask_status(client_);
+        v1::Status status = query();
         while (true) {
             if (const auto code = look(status)) return *code;
             do {
@@ -121,6 +121,16 @@ class Watch {
     }
 
   private:
+    v1::Status query() {
+        const serve::Reply reply = client_.get("/api/v1/status");
+        v1::Status status;
+        parse_answer(reply, status);
+        as_json_ = reply.body;
+        return status;
+    }
+    /// Where what is no status is said.
+    [[nodiscard]] std::ostream& aside() const { return options_.json ? std::cerr : std::cout; }
+
     /// Shows one status; the exit code when it is the last.
     std::optional<int> look(const v1::Status& status) {
         const auto now = Steady::now();
@@ -133,6 +143,8 @@ class Watch {
         const v1::Campaign::State state = status.campaign().state();
         if (screen_) {
             screen_->draw(serve::render_table(status, rates, Screen::width()), is_bad_end(state));
+        } else if (options_.json) {
+            std::cout << as_json_ << std::endl;
         } else if (!last_ || restarted || !serve::same_place(*last_, status)) {
             std::cout << serve::render_line(status) << std::endl;
         }
@@ -162,8 +174,8 @@ class Watch {
 
     std::optional<v1::Status> ask() {
         try {
-            v1::Status status = ask_status(client_);
-            if (gone_since_ && !screen_) std::cout << "vibrigd answers again" << std::endl;
+            v1::Status status = query();
+            if (gone_since_ && !screen_) aside() << "vibrigd answers again" << std::endl;
             gone_since_.reset();
             return status;
         } catch (const serve::ClientError& error) {
@@ -179,7 +191,7 @@ class Watch {
                 lines.insert(lines.end(), old.begin(), old.end());
                 screen_->draw(lines, true);
             } else if (first) {
-                std::cout << text << std::endl;
+                aside() << text << std::endl;
             }
             return {};
         }
@@ -190,6 +202,7 @@ class Watch {
     Pace pace_;
     std::optional<Screen> screen_;
     std::optional<v1::Status> last_;
+    std::string as_json_;  ///< the newest one
     Steady::time_point last_at_;
     std::optional<Steady::time_point> gone_since_, finished_since_;
 };

@@ -40,10 +40,7 @@ int check_at_rest(const serve::Address& at, const std::string& by, bool json) {
             "them");
     serve::Client client(at);
     wait_for_rest(client);
-    v1::Command command;
-    command.set_kind(v1::Command::selftest);
-    command.set_by(by);
-    command.set_argument("attended rest");
+    const auto command = command_of(v1::Command::selftest, by, "attended rest");
     if (const auto why = refusal_of(client, command); !why.empty()) {
         if (json)
             std::cout << proto::json_text(

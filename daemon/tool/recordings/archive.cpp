@@ -1,6 +1,4 @@
 // vibrig archive add and verify.
-#include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 

@@ -3,15 +3,14 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <iostream>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
 #include "proto/text.hpp"
 
@@ -42,15 +41,6 @@ std::string rig_name_rule(const std::string& rig) {
         rig.size() <= kLongest && proto::is_utf8(rig) &&
         std::ranges::none_of(rig, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
     return good ? "" : "1 to 64 bytes of UTF-8 without control characters";
-}
-
-std::string date_text(std::int64_t utc_ns, const char* format) {
-    const std::time_t seconds = utc_ns / 1'000'000'000;
-    std::tm parts{};
-    ::gmtime_r(&seconds, &parts);
-    std::array<char, 32> text{};
-    std::strftime(text.data(), text.size(), format, &parts);
-    return text.data();
 }
 
 }  // namespace
@@ -152,7 +142,10 @@ std::int64_t utc_of(const std::string& option, const std::string& text) {
            1'000'000'000;
 }
 
-std::string minute_text(std::int64_t utc_ns) { return date_text(utc_ns, "%Y-%m-%d %H:%M"); }
-std::string iso_text(std::int64_t utc_ns) { return date_text(utc_ns, "%Y-%m-%dT%H:%M:%SZ"); }
+std::string minute_text(std::int64_t utc_ns) { return report::utc_text(utc_ns).substr(0, 16); }
+std::string iso_text(std::int64_t utc_ns) {
+    const std::string text = report::utc_text(utc_ns);
+    return text.substr(0, 10) + "T" + text.substr(11, 8) + "Z";
+}
 
 }  // namespace vibrig::tool

@@ -38,7 +38,7 @@ class NoRig final : public StatusSource {
 };
 
 struct ServeOptions {
-    std::string page, remote, certificate, key, clients_ca, revoked;
+    serve::ServerSettings server = {};
     ArchiveOptions where = {};
 };
 
@@ -54,45 +54,38 @@ void check_port(const char* option, const std::string& address) {
 }
 
 int serve_archive(const ServeOptions& options) {
-    ServeOptions o = options;
-    check_port("--page", o.page);
-    check_port("--remote", o.remote);
-    const Whereabouts at = whereabouts_of(o.where);
+    serve::ServerSettings settings = options.server;
+    check_port("--page", settings.page);
+    check_port("--remote", settings.remote);
+    const Whereabouts at = whereabouts_of(options.where);
     if (at.place.folder.empty() || !std::filesystem::is_directory(at.place.folder))
         throw std::runtime_error("--archive: found '" + at.place.folder +
                                  "', expected the archive's folder");
     // It would be seen with the first page only.
     archive::Index(at.place.index, archive::Database::Mode::read);
-    if (!o.where.config.empty()) {
-        const auto server = configuration::load(o.where.config, false).configuration.server;
-        for (auto [to, from] : {std::pair{&o.certificate, &server.certificate},
-                                {&o.key, &server.key},
-                                {&o.clients_ca, &server.clients_ca},
-                                {&o.revoked, &server.revoked}})
+    if (const auto& config = options.where.config; !config.empty()) {
+        const auto server = configuration::load(config, false).configuration.server;
+        for (auto [to, from] : {std::pair{&settings.certificate, &server.certificate},
+                                {&settings.key, &server.key},
+                                {&settings.clients_ca, &server.clients_ca},
+                                {&settings.revoked, &server.revoked}})
             if (to->empty()) *to = *from;
     }
-    if (!o.remote.empty())
-        for (const auto& [option, value] : {std::pair{"--certificate", &o.certificate},
-                                            {"--key", &o.key},
-                                            {"--clients-ca", &o.clients_ca}})
+    if (!settings.remote.empty())
+        for (const auto& [option, value] : {std::pair{"--certificate", &settings.certificate},
+                                            {"--key", &settings.key},
+                                            {"--clients-ca", &settings.clients_ca}})
             if (value->empty())
                 throw std::runtime_error(std::string(option) +
                                          ": found nothing, expected a PEM file with --remote, or "
                                          "--config that names it");
-    if (o.page.empty() && o.remote.empty()) o.page = "127.0.0.1:8091";
+    if (settings.page.empty() && settings.remote.empty()) settings.page = "127.0.0.1:8091";
     sigset_t signals;
     ::sigemptyset(&signals);
     for (const int signal : {SIGINT, SIGTERM}) ::sigaddset(&signals, signal);
     ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     const ArchivePages pages(at.place);
     NoRig source;
-    serve::ServerSettings settings;
-    settings.page = o.page;
-    settings.remote = o.remote;
-    settings.certificate = o.certificate;
-    settings.key = o.key;
-    settings.clients_ca = o.clients_ca;
-    settings.revoked = o.revoked;
     // A recording takes its time on a slow line.
     settings.limits.idle_timeout = std::chrono::minutes(10);
     settings.documents = [&pages](std::string_view path, std::string_view query) {
@@ -116,17 +109,18 @@ void add_archive_serve(CLI::App& group, int& exit_code) {
     const auto [command, options] = add_command<ServeOptions>(
         group, exit_code, "serve", "Shows an archive in a browser; nothing can be changed there",
         serve_archive);
-    command.add_option("--page", options.page,
+    command.add_option("--page", options.server.page,
                        "plain HTTP on this machine, \"127.0.0.1:PORT\" (default: port 8091, "
                        "without --remote)");
-    command.add_option("--remote", options.remote,
+    command.add_option("--remote", options.server.remote,
                        "\"ADDRESS:PORT\": TLS with certificates on both sides, as server.remote");
-    command.add_option("--certificate", options.certificate,
+    command.add_option("--certificate", options.server.certificate,
                        "of --remote, PEM (default: of --config)");
-    command.add_option("--key", options.key, "of the certificate, PEM (default: of --config)");
-    command.add_option("--clients-ca", options.clients_ca,
+    command.add_option("--key", options.server.key,
+                       "of the certificate, PEM (default: of --config)");
+    command.add_option("--clients-ca", options.server.clients_ca,
                        "authority of the clients' certificates, PEM (default: of --config)");
-    command.add_option("--revoked", options.revoked,
+    command.add_option("--revoked", options.server.revoked,
                        "certificates that no longer count, PEM (default: of --config)");
     add_archive_options(command, options.where);
     command.footer(

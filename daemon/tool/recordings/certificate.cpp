@@ -271,8 +271,8 @@ int certify(const CertificateArguments& arguments) {
     }
     // They have their names once the journal knows them.
     const std::string unfinished = arguments.output + ".unfinished";
-    plot::write_file(unfinished + ".json", proto::json_text(certificate, 2) + "\n");
-    plot::write_file(unfinished + ".html", report::certificate_page(certificate));
+    proto::write_output(unfinished + ".json", proto::json_text(certificate, 2) + "\n");
+    proto::write_output(unfinished + ".html", report::certificate_page(certificate));
     print_pdf(unfinished + ".html", unfinished + ".pdf");
     const std::string no =
         arguments.no_journal

@@ -10,6 +10,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "estimator/filter/angles.hpp"
 #include "proto/recording_csv.hpp"
 
@@ -41,10 +42,7 @@ class DwellColumns {
         stated_ = random_ || any([](const record::Order& order) {
                       return order.frequency_hz > 0 || order.sweep.any();
                   });
-        if (!stated_) return;
-        rig_ = configuration::parse(record::identification_sections(campaign.head.configuration),
-                                    "configuration in " + campaign.path, false)
-                   .configuration;
+        if (stated_) rig_ = report::configuration_of(campaign);
     }
 
     void begin(const record::RecordedDwell& dwell) {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -13,10 +12,10 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/configuration/random_profiles.hpp"
 #include "daemon/record/in_order.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/record/shaken.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "daemon/results/text_line.hpp"
@@ -44,8 +43,8 @@ struct Found {
     std::string contradiction;  ///< the first; empty: none
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
-    std::vector<SpectrumResult::HeldOut> kept_out;  ///< of a CSV file, by its roles
-    std::vector<estimator::DwellRow> rows;          ///< of a campaign, those apart included
+    std::vector<HeldOut> kept_out;          ///< of a CSV file, by its roles
+    std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
     estimator::spectrum::Shaken shaken;
 };
 
@@ -245,16 +244,23 @@ bool has_common_clock(const std::vector<Dwell>& dwells) {
     return true;
 }
 
-DwellKinds kinds_of(const std::vector<Dwell>& dwells, const std::vector<std::string>& profiles,
-                    const configuration::Configuration& rig, const SpectrumRequest& request,
-                    const std::string& file) {
-    DwellKinds kinds(rig, request.spectra);
-    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
+void expect_sine(const DwellKinds& kinds, const SpectrumRequest& request, const std::string& file) {
     if (!kinds.kinds().empty() && !kinds.reference() && !request.held_out)
         throw std::runtime_error(file +
                                  ": found random vibration alone, expected dwells at one sine "
                                  "frequency at least, which the 30 coefficients are of");
-    return kinds;
+}
+
+/// Of dwells whose column `frequency_hz` has a frequency, which may be that of a table at 0 g.
+void warn_of_rest(const std::vector<Dwell>& dwells, const std::vector<std::size_t>& resting,
+                  estimator::Result& result) {
+    if (resting.empty()) return;
+    const Dwell& first = dwells[resting.front()];
+    result.warnings.push_back(
+        printed("column frequency_hz has a frequency in %zu dwells in which nothing vibrates: they "
+                "are taken as rest (the first: line %zu, run %d, position %d, %g Hz)",
+                resting.size(), first.rows.front()->line, first.run, first.position,
+                first.rows.front()->frequency_hz));
 }
 
 /// A frequency of which a harmonic falls on a multiple of the sampling rate, where the recording
@@ -296,6 +302,109 @@ void refuse_unseen(const DwellKinds& kinds, const estimator::Settings& settings,
     }
 }
 
+/// Dwells of which the recording says with which frequency they shook, once through the filter.
+class DwellsIdentified {
+  public:
+    DwellsIdentified(const std::vector<Dwell>& dwells, const DwellKinds& kinds,
+                     const estimator::Settings& settings, const std::string& file)
+        : dwells_(dwells),
+          kinds_(kinds),
+          settings_(settings),
+          file_(file),
+          common_clock_(has_common_clock(dwells)),
+          identification_(settings, dwells.size()),
+          doubts_(settings),
+          plan_(settings) {
+        std::size_t samples = 0, done = 0;
+        for (const Dwell& dwell : dwells) samples += dwell.rows.size();
+        Progress progress("identifying");
+        for (std::size_t d = 0; d < dwells.size(); ++d) {
+            const std::size_t before = identification_.rows().size();
+            begin_dwell(d);
+            for (const RecordingRow* row : dwells[d].rows) {
+                const auto measurement = measurement_of(*row);
+                static_cast<void>(identification_.add(measurement));
+                doubts_.add(measurement);
+                plan_.add(measurement);
+                // Asking a clock costs more than a filter step.
+                if (++done % 1024 == 0) progress.show(done, samples);
+            }
+            static_cast<void>(identification_.end_dwell());
+            if (identification_.rows().size() > before) keep(d, identification_.rows().back());
+        }
+    }
+
+    /// Those that may have been at rest, and were.
+    [[nodiscard]] const std::vector<std::size_t>& resting() const { return resting_; }
+    [[nodiscard]] Found found(bool held_out) {
+        if (!held_out) plan_.tell();
+        found_.kinds = kinds_.kinds();
+        found_.result = identification_.result();
+        found_.contradiction = doubts_.tell(found_.result, identification_.rows());
+        return std::move(found_);
+    }
+
+  private:
+    void begin_dwell(std::size_t d) {
+        const Dwell& dwell = dwells_[d];
+        const auto kind = kinds_.of(d);
+        estimator::DwellInfo info{dwell.run, dwell.position};
+        if (common_clock_) info.begin_s = 0;
+        info.held_out = dwell.rows.front()->held_out;
+        hold_out(info.held_out, settings_);
+        info.random = kinds_.random(d);
+        if (kind && !is_random(d)) info.frequency_hz = kinds_.kinds()[*kind].hz();
+        if (kind)
+            info.seen = estimator::spectrum::seen_of(settings_.accelerometer_response,
+                                                     kinds_.kinds()[*kind].bands);
+        identification_.begin_dwell(info);
+        doubts_.begin_dwell();
+        plan_.begin_dwell(dwell.run);
+    }
+    [[nodiscard]] bool is_random(std::size_t d) const {
+        return kinds_.random(d).mean_square_g2 > 0;
+    }
+    void keep(std::size_t d, const estimator::DwellRow& row) {
+        const auto kind = kinds_.of(d);
+        const bool shook = row.vibration.kappa > 1;
+        if (shook && !kind)
+            refuse(d, "a dwell at rest that vibrates by " +
+                          std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
+                          " g, expected its frequency");
+        if (!shook && kind) {
+            // As rest, what shook unseen would be gravity's.
+            const auto said = kinds_.said_by(d);
+            if (said == DwellKinds::Said::stated ||
+                (said == DwellKinds::Said::column && !settings_.accelerometer_response.flat()))
+                refuse(d, "a dwell in which nothing vibrates, expected " +
+                              (is_random(d) ? "profile '" + kinds_.kinds()[*kind].profile + "'"
+                                            : printed("%g Hz", kinds_.kinds()[*kind].hz())) +
+                              ", with which it is said to have shaken");
+            resting_.push_back(d);
+        }
+        if (row.held_out)
+            found_.kept_out.push_back(
+                {row, shook ? kinds_.kinds()[*kind] : estimator::spectrum::Kind{}});
+        else
+            found_.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
+    }
+    [[noreturn]] void refuse(std::size_t d, const std::string& what) const {
+        throw std::runtime_error(file_ + ":" + std::to_string(dwells_[d].rows.front()->line) +
+                                 ": found " + what);
+    }
+
+    const std::vector<Dwell>& dwells_;
+    const DwellKinds& kinds_;
+    const estimator::Settings& settings_;
+    const std::string& file_;
+    bool common_clock_;
+    estimator::Identification identification_;
+    RigDoubts doubts_;
+    SeenPlan plan_;
+    Found found_;
+    std::vector<std::size_t> resting_;
+};
+
 /// A recording that says with which frequency each dwell shook: kept whole, since the frequency
 /// that the filter takes is known at its end.
 Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::string>& profiles,
@@ -303,75 +412,30 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
                const std::string& file) {
     estimator::Settings settings = rig.estimator;
     std::vector<Dwell> dwells = dwells_of(rows);
-    Found found;
-    found.shaken.sweeps = take_sweeps(dwells, settings, file);
-    const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
-    const auto reference = kinds.reference();
-    if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
-    refuse_forbidden(kinds, rows, settings, file, !request.spectra.empty());
-    refuse_unseen(kinds, settings, file);
-    const bool common_clock = has_common_clock(dwells);
-    estimator::Identification identification(settings, dwells.size());
-    RigDoubts doubts(settings);
-    SeenPlan plan(settings);
-    Progress progress("identifying");
-    std::size_t done = 0;
-    found.kinds = kinds.kinds();
-    for (std::size_t d = 0; d < dwells.size(); ++d) {
-        const Dwell& dwell = dwells[d];
-        const auto kind = kinds.of(d);
-        const std::size_t before = identification.rows().size();
-        estimator::DwellInfo info{dwell.run, dwell.position};
-        if (common_clock) info.begin_s = 0;
-        info.held_out = dwell.rows.front()->held_out;
-        hold_out(info.held_out, settings);
-        info.random = kinds.random(d);
-        const bool random = info.random.mean_square_g2 > 0;
-        if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();
-        if (kind)
-            info.seen = estimator::spectrum::seen_of(settings.accelerometer_response,
-                                                     kinds.kinds()[*kind].bands);
-        identification.begin_dwell(info);
-        doubts.begin_dwell();
-        plan.begin_dwell(dwell.run);
-        for (const RecordingRow* row : dwell.rows) {
-            const auto measurement = measurement_of(*row);
-            static_cast<void>(identification.add(measurement));
-            doubts.add(measurement);
-            plan.add(measurement);
-            // Asking a clock costs more than a filter step.
-            if (++done % 1024 == 0) {
-                progress.show(done, rows.size());
-            }
+    auto sweeps = take_sweeps(dwells, settings, file);
+    DwellKinds kinds(rig, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
+    std::vector<std::size_t> set_points_at_rest;
+    while (true) {
+        expect_sine(kinds, request, file);
+        const auto reference = kinds.reference();
+        settings.frequency_hz =
+            reference ? kinds.kinds()[*reference].hz() : rig.estimator.frequency_hz;
+        refuse_forbidden(kinds, rows, settings, file, !request.spectra.empty());
+        refuse_unseen(kinds, settings, file);
+        DwellsIdentified identified(dwells, kinds, settings, file);
+        if (identified.resting().empty()) {
+            Found found = identified.found(request.held_out);
+            found.shaken.sweeps = std::move(sweeps);
+            warn_of_rest(dwells, set_points_at_rest, found.result);
+            return found;
         }
-        static_cast<void>(identification.end_dwell());
-        if (identification.rows().size() > before) {
-            const estimator::DwellRow& row = identification.rows().back();
-            const bool shook = row.vibration.kappa > 1;
-            if (shook && !kind)
-                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
-                                         ": found a dwell at rest that vibrates by " +
-                                         std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
-                                         " g, expected its frequency");
-            // As rest, what shook unseen would be gravity's.
-            if (!shook && kind)
-                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
-                                         ": found a dwell in which nothing vibrates, expected " +
-                                         (random ? "profile '" + kinds.kinds()[*kind].profile + "'"
-                                                 : printed("%g Hz", kinds.kinds()[*kind].hz())) +
-                                         ", with which it is said to have shaken");
-            if (row.held_out)
-                found.kept_out.push_back(
-                    {row, shook ? kinds.kinds()[*kind] : estimator::spectrum::Kind{}});
-            else
-                found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
-        }
+        // What is known to be at rest is no dwell of another frequency, which the filter would
+        // leave out: all of it again.
+        for (const std::size_t d : identified.resting())
+            if (kinds.said_by(d) == DwellKinds::Said::column) set_points_at_rest.push_back(d);
+        kinds.put_at_rest(identified.resting());
     }
-    if (!request.held_out) plan.tell();
-    Found whole = with_doubts(identification.result(), identification.rows(), doubts);
-    found.result = std::move(whole.result);
-    found.contradiction = std::move(whole.contradiction);
-    return found;
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
@@ -416,12 +480,9 @@ Found identify_campaign(const std::string& path, const std::string& config,
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
-    const auto loaded =
-        config.empty()
-            ? configuration::parse(record::identification_sections(campaign.head.configuration),
-                                   "configuration in " + campaign.path, false)
-            : configuration::load(config, false);
-    settings = loaded.configuration.estimator;
+    const auto rig = config.empty() ? report::configuration_of(campaign)
+                                    : configuration::load(config, false).configuration;
+    settings = rig.estimator;
     simulated = campaign.head.simulated;
     if (campaign.found) {
         live = {*campaign.found, record::live_result(campaign, settings), {}};
@@ -429,7 +490,7 @@ Found identify_campaign(const std::string& path, const std::string& config,
     }
     settings = dwells::Anew::settings_of(settings, campaign.found);
     Found found = identify(campaign, settings);
-    found.shaken = record::shaken_of(campaign, loaded.configuration);
+    found.shaken = record::shaken_of(campaign, rig);
     return found;
 }
 
@@ -454,9 +515,8 @@ bool is_campaign(const std::string& argument) {
 
 /// Of a recording whose dwells are to prove a result: those that it holds out itself, or all.
 std::vector<HeldOut> held_out_of(const Found& found) {
+    if (!found.kept_out.empty()) return found.kept_out;
     std::vector<HeldOut> list;
-    for (const auto& [row, kind] : found.kept_out) list.push_back({row, kind});
-    if (!list.empty()) return list;
     for (const auto& dwell : found.spectral)
         list.push_back(
             {dwell.row, dwell.kind ? found.kinds[*dwell.kind] : estimator::spectrum::Kind{}});

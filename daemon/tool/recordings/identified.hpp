@@ -12,12 +12,8 @@
 
 namespace vibrig::tool {
 
-/// A dwell that a result is tried on, and the name of the profile that shook it; none: a sine.
-struct HeldOut {
-    estimator::DwellRow row;
-    /// Kind of what it shook with; a random one whose PSD is known has its own bands.
-    estimator::spectrum::Kind kind;
-};
+/// A dwell that a result is tried on.
+using HeldOut = SpectrumResult::HeldOut;
 
 /// What a recording gives: coefficients, and what can be believed of them.
 struct Identified {

@@ -17,9 +17,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct ListOptions {
-    std::string serial, type, rig, since, until, verdict, name;
-    std::size_t newest = 0;
-    bool superseded = false, json = false;
+    archive::Filter filter = {};
+    std::string since, until;
+    bool json = false;
     ArchiveOptions where = {};
 };
 
@@ -71,14 +71,8 @@ void print_table(const std::vector<archive::Entry>& found) {
 }
 
 int list(const ListOptions& o) {
-    archive::Filter filter;
-    filter.serial = o.serial;
-    filter.type = o.type;
-    filter.rig = o.rig;
-    filter.name = o.name;
-    filter.verdict = o.verdict == "not-valid" ? "not valid" : o.verdict;
-    filter.newest = o.newest;
-    filter.superseded = o.superseded;
+    archive::Filter filter = o.filter;
+    if (filter.verdict == "not-valid") filter.verdict = "not valid";
     if (!o.since.empty()) filter.since_utc_ns = utc_of("--since", o.since);
     if (!o.until.empty()) filter.until_utc_ns = utc_of("--until", o.until);
     const auto found = open_index(o.where)->campaigns(filter);
@@ -102,17 +96,17 @@ int list(const ListOptions& o) {
 void add_list(CLI::App& app, int& exit_code) {
     const auto [command, options] = add_command<ListOptions>(
         app, exit_code, "list", "Campaigns of an archive or a rig, by time", list);
-    command.add_option("--serial", options.serial, "of this unit");
-    command.add_option("--type", options.type, "of this type of unit");
-    command.add_option("--rig", options.rig, "of this rig");
-    command.add_option("--name", options.name, "of this name");
+    command.add_option("--serial", options.filter.serial, "of this unit");
+    command.add_option("--type", options.filter.type, "of this type of unit");
+    command.add_option("--rig", options.filter.rig, "of this rig");
+    command.add_option("--name", options.filter.name, "of this name");
     command.add_option("--since", options.since, "begun on this day or later, UTC: 2026-03-01");
     command.add_option("--until", options.until, "begun before this day, UTC");
-    command.add_option("--verdict", options.verdict, "with this verdict")
+    command.add_option("--verdict", options.filter.verdict, "with this verdict")
         ->check(CLI::IsMember({"valid", "doubtful", "not valid", "not-valid"}));
-    command.add_option("--newest", options.newest, "at most so many, the newest")
+    command.add_option("--newest", options.filter.newest, "at most so many, the newest")
         ->check(CLI::Range(1, 1'000'000'000));
-    command.add_flag("--superseded", options.superseded,
+    command.add_flag("--superseded", options.filter.superseded,
                      "also what was delivered before the campaign went on");
     command.add_flag("--json", options.json, "print them as JSON");
     add_archive_options(command, options.where);

@@ -1,7 +1,6 @@
 // vibrig export and vibrig recover.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -13,7 +12,7 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
-#include "daemon/report/report.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
@@ -32,53 +31,45 @@ namespace fs = std::filesystem;
 using estimator::kDegPerRad;
 
 void export_mat(const record::Campaign& campaign, const std::string& path) {
-    std::vector<double> time, sequence, angle, force, table, quality, run, position;
+    const auto& samples = campaign.samples;
     const auto dwells = record::recorded_dwells(campaign);
-    std::vector<std::array<int, 2>> of(campaign.samples.size());
+    std::vector<double> angle, force, quality, run(samples.size()), position(samples.size());
     for (const auto& dwell : dwells) {
-        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
-            of[i] = {dwell.order->run, dwell.order->position};
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+            run[i] = dwell.order->run;
+            position[i] = dwell.order->position;
+        }
     }
-    const drivers::Time origin = campaign.samples.empty() ? 0 : campaign.samples.front().time;
-    for (std::size_t i = 0; i < campaign.samples.size(); ++i) {
-        const auto& s = campaign.samples[i];
-        time.push_back(drivers::to_seconds(s.time - origin));
-        sequence.push_back(s.sequence);
+    for (const auto& s : samples) {
         for (const double a : s.angle) angle.push_back(a * kDegPerRad);
         force.insert(force.end(), s.force.begin(), s.force.end());
-        table.push_back(s.table_accel);
         for (std::size_t k = 0; k < drivers::kChannels; ++k)
             quality.push_back(static_cast<double>(s.quality[k]));
-        run.push_back(of[i][0]);
-        position.push_back(of[i][1]);
     }
+    const drivers::Time origin = samples.empty() ? 0 : samples.front().time;
+    const auto since = [origin](drivers::Time time) { return drivers::to_seconds(time - origin); };
     MatFile file(path);
+    const auto add = [&file](const char* name, const auto& rows, const auto& number_of) {
+        std::vector<double> column;
+        for (const auto& row : rows) column.push_back(number_of(row));
+        file.add(name, column);
+    };
     file.add("name", campaign.head.name);
     file.add("configuration", campaign.head.configuration);
     file.add("result_json", campaign.result_json);
     file.add("simulated", std::vector<double>{campaign.head.simulated ? 1.0 : 0.0});
     file.add("start_utc_s",
              std::vector<double>{drivers::to_seconds(origin + campaign.head.utc_offset_ns)});
-    file.add("time_s", time);
-    file.add("sequence", sequence);
+    add("time_s", samples, [&](const auto& s) { return since(s.time); });
+    add("sequence", samples, [](const auto& s) { return s.sequence; });
     file.add("angle_deg", angle, 3);
     file.add("force_g", force, 3);
-    file.add("table_accel_g", table);
+    add("table_accel_g", samples, [](const auto& s) { return s.table_accel; });
     file.add("quality", quality, drivers::kChannels);
     file.add("run", run);
     file.add("position", position);
-    std::vector<double> d_run, d_position, d_table, d_from, d_to, value, sigma, covariance, kappa,
-        nis;
-    for (const auto& dwell : dwells) {
-        d_run.push_back(dwell.order->run);
-        d_position.push_back(dwell.order->position);
-        d_table.push_back(dwell.order->table_g);
-        d_from.push_back(drivers::to_seconds(dwell.order->from - origin));
-        d_to.push_back(drivers::to_seconds(dwell.order->to - origin));
-    }
+    std::vector<double> value, sigma, covariance;
     for (const auto& dwell : campaign.dwells) {
-        kappa.push_back(dwell.summary.kappa);
-        nis.push_back(dwell.summary.nis_per_dof);
         value.insert(value.end(), dwell.value.begin(), dwell.value.end());
         sigma.insert(sigma.end(), dwell.sigma.begin(), dwell.sigma.end());
     }
@@ -87,18 +78,19 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
     for (const char* name : estimator::parameter_names())
         names += (names.empty() ? "" : " ") + std::string(name);
     file.add("coefficients", names);
-    file.add("dwell_run", d_run);
-    file.add("dwell_position", d_position);
-    file.add("dwell_table_g", d_table);
-    file.add("dwell_from_s", d_from);
-    file.add("dwell_to_s", d_to);
-    file.add("dwell_kappa", kappa);
-    file.add("dwell_nis_per_dof", nis);
+    add("dwell_run", dwells, [](const auto& dwell) { return dwell.order->run; });
+    add("dwell_position", dwells, [](const auto& dwell) { return dwell.order->position; });
+    add("dwell_table_g", dwells, [](const auto& dwell) { return dwell.order->table_g; });
+    add("dwell_from_s", dwells, [&](const auto& dwell) { return since(dwell.order->from); });
+    add("dwell_to_s", dwells, [&](const auto& dwell) { return since(dwell.order->to); });
+    add("dwell_kappa", campaign.dwells, [](const auto& dwell) { return dwell.summary.kappa; });
+    add("dwell_nis_per_dof", campaign.dwells,
+        [](const auto& dwell) { return dwell.summary.nis_per_dof; });
     file.add("dwell_value", value, estimator::kParameters);
     file.add("dwell_sigma", sigma, estimator::kParameters);
     file.add("covariance", covariance, estimator::kParameters);
     file.finish();
-    std::cerr << path << ": " << campaign.samples.size() << " samples\n";
+    std::cerr << path << ": " << samples.size() << " samples\n";
 }
 
 /// Whole lines of a candump log without what Wireshark does not take: directions, comments.

@@ -10,6 +10,7 @@
 #include "daemon/record/candump_campaign.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/record/shaken.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
@@ -21,6 +22,7 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "estimator/filter/instruction_set.hpp"
+#include "proto/candump.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
@@ -54,12 +56,20 @@ configuration::Configuration replayed_rig(const ReplayArguments& arguments,
                                           const record::Campaign& campaign) {
     if (!arguments.config.empty())
         return configuration::load(arguments.config, false).configuration;
-    return configuration::parse(record::identification_sections(campaign.head.configuration),
-                                "configuration in " + campaign.path, false)
-        .configuration;
+    return report::configuration_of(campaign);
 }
 
-bool is_log(const std::string& path) { return path.ends_with(".log") || path.ends_with(".zst"); }
+/// Whatever it is called: `vibrig export` writes one under any name.
+bool is_log(const std::string& path) {
+    if (path.ends_with(".log") || path.ends_with(".zst") || path.ends_with(".candump")) return true;
+    std::error_code none;
+    if (!fs::is_regular_file(path, none) || record::is_hdf5(path)) return false;
+    try {
+        return proto::CandumpReader(path).next().has_value();
+    } catch (const std::exception&) {
+        return false;
+    }
+}
 
 record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     const std::string& first = arguments.files.front();
@@ -204,7 +214,7 @@ void add_replay(CLI::App& app, int& exit_code) {
     command
         .add_option("FILE", arguments.files,
                     "a campaign: its folder, HDF5 file or name in the index; or candump logs in "
-                    "order (.log, .log.zst)")
+                    "order (.log, .log.zst, as vibrig export writes them)")
         ->required();
     command.add_option("--speed", arguments.speed, "times the recording's own, or max (default)");
     command.add_option("--config", arguments.config,
@@ -216,9 +226,11 @@ void add_replay(CLI::App& app, int& exit_code) {
         .add_option("--instruction-set", arguments.instruction_set,
                     "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
-    command.add_option("--plot", arguments.plot,
-                       "an SVG file: uncertainties of the coefficients; or a folder: their "
-                       "correlation and the dwells' residuals, too");
+    command
+        .add_option("--plot", arguments.plot,
+                    "an SVG file: uncertainties of the coefficients; or a folder: their "
+                    "correlation and the dwells' residuals, too")
+        ->check(proto::charts());
     command.add_flag("--json", arguments.json, "print the result as JSON");
     command.add_flag("--strict", arguments.strict, "a doubtful result is a no as well");
     command.footer(

@@ -1,6 +1,5 @@
 // vibrig report and vibrig compensate.
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -125,13 +124,16 @@ int make_report(const ReportArguments& arguments) {
     analysis.journal = report::journal_verdict(campaign, arguments.journal);
     if (analysis.journal.starts_with('!'))
         std::cerr << "journal: " << analysis.journal.substr(1) << '\n';
-    plot::write_file(arguments.output, report::make_page(campaign, analysis, earlier));
-    std::cerr << arguments.output << ": " << fs::file_size(arguments.output) / 1000 << " kB\n";
+    const std::string page = report::make_page(campaign, analysis, earlier);
+    proto::write_output(arguments.output, page);
+    std::cerr << arguments.output << ": " << page.size() / 1000 << " kB\n";
     if (!arguments.pdf.empty()) {
         proto::OutputFile pdf(arguments.pdf);
         print_pdf(arguments.output, pdf.place());
+        std::error_code none;
+        const auto size = fs::file_size(pdf.place(), none);
         pdf.finish();
-        std::cerr << arguments.pdf << ": " << fs::file_size(arguments.pdf) / 1000 << " kB\n";
+        std::cerr << arguments.pdf << (none ? "" : printed(": %ju kB", size / 1000)) << '\n';
     }
     const auto& verdict = analysis.assessed.verdict;
     std::cerr << "verdict: " << verdict.sentence << '\n';
@@ -386,7 +388,7 @@ int compensate(const CompensateArguments& arguments) {
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {
-        plot::write_file(arguments.output, text);
+        proto::write_output(arguments.output, text);
     }
     return all ? 0 : kNo;
 }

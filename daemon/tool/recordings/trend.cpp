@@ -1,8 +1,4 @@
 // vibrig trend: a unit's coefficients over its campaigns.
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -10,7 +6,6 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
-#include "estimator/identification/identification.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
@@ -73,8 +68,10 @@ void add_trend(CLI::App& app, int& exit_code) {
                "a longer pause between two campaigns counts as a shutdown, h", 0, 1e6)
         ->capture_default_str();
     command.add_flag("--json", options.json, "print it as JSON");
-    command.add_option("--plot", options.plot,
-                       "an SVG file for all, or a folder for a chart of each coefficient");
+    command
+        .add_option("--plot", options.plot,
+                    "an SVG file for all, or a folder for a chart of each coefficient")
+        ->check(proto::charts());
     add_archive_options(command, options.where);
     command.footer(
         "Example: vibrig trend 0017 --archive /lab/archive --plot trend/\n"

@@ -1,6 +1,5 @@
 #include "daemon/tool/recordings/trend_output.hpp"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/plot/chart.hpp"

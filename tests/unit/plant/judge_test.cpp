@@ -56,6 +56,23 @@ TEST(Judge, FailsWhatIsFarMissingNullOrUnobservable) {
     EXPECT_FALSE(judged(perfect(), 0.5).passed);
 }
 
+TEST(Judge, NamesAFileThatIsNoJsonAndItsPlace) {
+    const auto complaint = [](const std::string& text) {
+        try {
+            static_cast<void>(judge(text, "result.json", Truth{}, 4));
+        } catch (const PlantError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(complaint("{\n \"parameters\": nothing}"),
+              "result.json: not JSON, expected an identification result; line 2, column 17");
+    EXPECT_EQ(
+        complaint(""),
+        "result.json: not JSON, expected an identification result; line 1, column 1: the text "
+        "ends");
+}
+
 TEST(Judge, TakesTheDeviationThatBelongsToTheValue) {
     // GIVEN a result with a budget, whose sigma belongs to value_constant
     nlohmann::json root = perfect();

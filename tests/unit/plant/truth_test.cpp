@@ -102,6 +102,9 @@ TEST(Truth, NamesTheKeyOfBadInput) {
            "shaker.timeout_register: found -1");
     expect(replaced(good, "\"seed\": 1", "\"seed\": -1"), "seed: found -1");
     expect("", "not JSON");
+    // In words of ours, with the place.
+    expect("{\n", "truth.json: not JSON, expected a truth file; line 2, column 1: the text ends");
+    expect("{\"seed\": 1e999}", "truth.json: not JSON, expected a truth file; a number");
     expect("[1, 2]", "expected an object");
     expect("{}", "coefficients: missing");
     expect(good.substr(0, good.size() / 2), "not JSON");

@@ -376,8 +376,8 @@ class Live {
         const int run = summary.run, position = summary.position;
         record::Swept swept;
         for (const auto& [time_s, hz] : dwell.stop.swept_hz)
-            swept.rows.push_back({dwell.from + drivers::from_seconds(time_s), run, position, hz});
-        if (!swept.rows.empty()) recording_->put(swept);
+            swept.push_back({dwell.from + drivers::from_seconds(time_s), run, position, hz});
+        if (!swept.empty()) recording_->put(swept);
         if (dwell.played)
             recording_->put(
                 record::Played{dwell.from, run, position, *dwell.played, dwell.stop.psd});

@@ -90,16 +90,16 @@ TEST_F(Recording, HasTheFrequencyOfASweepAndMakesItsBlocksAgain) {
     writer.put(order);
     Swept swept;
     for (double t = -1; t <= kSweep_s + 0.5; t += 0.2)
-        swept.rows.push_back({from + drivers::from_seconds(t), 1, 2, hz_at(t)});
-    swept.rows.push_back({from + drivers::kSecond, 3, 2, 5});  // of another dwell
+        swept.push_back({from + drivers::from_seconds(t), 1, 2, hz_at(t)});
+    swept.push_back({from + drivers::kSecond, 3, 2, 5});  // of another dwell
     writer.put(swept);
     writer.commit();
     writer.end({"finished", "", "", "{}", head().utc_ns + 1});
     // WHEN it is read THEN they are there, and the accelerometers show what they say
     const Campaign read = read_campaign(folder_.string());
-    ASSERT_EQ(read.swept.size(), swept.rows.size());
-    EXPECT_EQ(read.swept[7].time, swept.rows[7].time);
-    EXPECT_EQ(read.swept[7].frequency_hz, swept.rows[7].frequency_hz);
+    ASSERT_EQ(read.swept.size(), swept.size());
+    EXPECT_EQ(read.swept[7].time, swept[7].time);
+    EXPECT_EQ(read.swept[7].frequency_hz, swept[7].frequency_hz);
     ASSERT_EQ(read.orders.size(), 1U);
     EXPECT_EQ(read.orders[0].sweep, order.sweep);
     EXPECT_EQ(read.orders[0].dwell().sweep, order.sweep);

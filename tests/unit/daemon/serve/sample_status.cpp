@@ -100,7 +100,7 @@ StatusData full_status() {
                1'800'000'000'000'000'000,
                true,
                "stop too slow",
-               {{"stop, table", "s", 0.4, 0.1, 3, true}},
+               {{"stop, table", "s", 0.4, 0.1, 3}},
                "press the emergency stop now",
                {{1'700'000'000'000'000'000, true, 0.5, 1.7, 0.4}},
                "0af1",
@@ -123,7 +123,7 @@ StatusData full_status() {
                      1,    1,    "it hung"};
     s.witness_g = {8.9, 9.1};
     s.channel_age_s = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7};
-    s.platform = {1'234'000'000'000, true, true, true, 31.25, true,
+    s.platform = {1'234'000'000'000, true, true, true, 31.25, true, false, false, 1'234'000'000'000,
                   1'234'100'000'000, true, true, 61};
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         s.estimate.value[i] = -0.5 - static_cast<double>(i);
@@ -161,8 +161,7 @@ StatusData full_status() {
                   100};
     s.frame = {
         {2, -1}, {1, -1, 1}, {1, 2, 3}, {0.1, 0.2, 0.3}, {{{2, 1, 1}, {1, 2, 1}, {1, 1, 2}}}};
-    s.loop_check = {
-        "out of band", "Ada", "transmission", {{"transmission", "1", 0.5, 0.6, 0.7, true}}};
+    s.loop_check = {"out of band", "Ada", "transmission", {{"transmission", "1", 0.65, 0.6, 0.7}}};
     s.rest_check = {"refused", "Ada", 141, "mean force 33 deg off", {"platform.encoder_sign"}};
     s.latency.add(150'000);
     s.mqtt = {"broker.lab:8883", true, "no route to host", 101, 102, 103, 104};

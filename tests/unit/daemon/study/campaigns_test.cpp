@@ -63,7 +63,7 @@ class StudyRun : public ::testing::Test {
         Merged merged(folder);
         Reduction reduction(folder);
         for (TaskRecord record; merged.next(record);) reduction.add(record.index, record.bytes);
-        EXPECT_EQ(merged.missing_count(), 0U);
+        EXPECT_EQ(merged.found().missing_count, 0U);
         return reduction.result(0).dump();
     }
 

@@ -62,7 +62,7 @@ void expect_cheap(std::uint64_t tasks) {
     Merged merged(folder);
     Reduction reduction(folder);
     for (TaskRecord one; merged.next(one);) reduction.add(one.index, one.bytes);
-    const auto result = reduction.result(merged.missing_count());
+    const auto result = reduction.result(merged.found().missing_count);
     const double merge_s = processor_s() - begin;
     const double growth_mb = most_memory_mb() - memory_before;
     fs::remove_all(top);

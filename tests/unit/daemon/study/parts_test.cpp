@@ -80,7 +80,7 @@ class StudyParts : public ::testing::Test {
         Merged merged(folder_);
         Reduction reduction(folder_);
         for (TaskRecord record; merged.next(record);) reduction.add(record.index, record.bytes);
-        return reduction.result(merged.missing_count()).dump();
+        return reduction.result(merged.found().missing_count).dump();
     }
     static std::string content(const fs::path& path) {
         std::ostringstream text;
@@ -104,7 +104,7 @@ TEST_F(StudyParts, InAnyPiecesGiveOneResult) {
     }
     write({3, 9, 39});  // a duplicate is expected after a requeue
     EXPECT_EQ(result(), whole);
-    EXPECT_EQ(status_of(folder_).duplicates, 3U);
+    EXPECT_EQ(status_of(folder_).found.duplicates, 3U);
     EXPECT_EQ(compact(folder_).parts, 8U);
     EXPECT_EQ(parts_in(folder_.parts()).size(), 1U);
     EXPECT_EQ(result(), whole);
@@ -155,7 +155,7 @@ TEST_F(StudyParts, WithAFlippedBitGiveNothingWrong) {
         Merged merged(folder_);
         for (TaskRecord record; merged.next(record);)
             EXPECT_EQ(record.bytes, made_up(record.index)) << "seed " << seed << ", bit " << bit;
-        EXPECT_EQ(merged.damaged().size() + merged.foreign().size(), 1U) << bit;
+        EXPECT_EQ(merged.found().damaged.size() + merged.found().foreign.size(), 1U) << bit;
     }
 }
 
@@ -173,9 +173,9 @@ TEST_F(StudyParts, ThatContradictEachOtherAreNamed) {
         ++count;
     }
     EXPECT_EQ(count, 19U);
-    ASSERT_EQ(merged.contradictions().size(), 1U);
-    EXPECT_THAT(merged.contradictions()[0], HasSubstr("task 7: "));
-    EXPECT_THAT(merged.missing(), ElementsAre(std::pair(7U, 7U), std::pair(20U, 39U)));
+    ASSERT_EQ(merged.found().contradictions.size(), 1U);
+    EXPECT_THAT(merged.found().contradictions[0], HasSubstr("task 7: "));
+    EXPECT_THAT(merged.found().missing, ElementsAre(std::pair(7U, 7U), std::pair(20U, 39U)));
     EXPECT_THAT(compact(folder_).refused, HasSubstr("task 7: "));
     EXPECT_EQ(parts_in(folder_.parts()).size(), 2U);
 }
@@ -189,10 +189,10 @@ TEST_F(StudyParts, OfAnotherStudyAreNamedAndLeftOut) {
     Merged merged(folder_);
     TaskRecord record;
     EXPECT_FALSE(merged.next(record));
-    ASSERT_EQ(merged.foreign().size(), 2U);
-    EXPECT_THAT(merged.foreign()[0], HasSubstr("a part of another study"));
-    EXPECT_THAT(merged.foreign()[1], HasSubstr("notes.txt: not a part"));
-    EXPECT_EQ(merged.missing_count(), 40U);
+    ASSERT_EQ(merged.found().foreign.size(), 2U);
+    EXPECT_THAT(merged.found().foreign[0], HasSubstr("a part of another study"));
+    EXPECT_THAT(merged.found().foreign[1], HasSubstr("notes.txt: not a part"));
+    EXPECT_EQ(merged.found().missing_count, 40U);
 }
 
 TEST_F(StudyParts, ThatAreDamagedOutliveTheCompaction) {
@@ -226,7 +226,7 @@ TEST_F(StudyParts, OfACompactionThatWasKilledDoNoHarm) {
     const std::string bytes = content(whole);
     std::ofstream(torn, std::ios::binary) << bytes.substr(0, bytes.size() / 3);
     EXPECT_EQ(result(), before);
-    EXPECT_THAT(Merged(folder_).damaged(), IsEmpty());
+    EXPECT_THAT(Merged(folder_).found().damaged, IsEmpty());
     // Before it removed what it had read; and one of another machine, that may be at work.
     const std::string other = folder_.parts() + "/0of1-elsewhere-2147483646-0.part.tmp";
     std::ofstream(other, std::ios::binary) << bytes;
@@ -248,7 +248,7 @@ TEST_F(StudyParts, ThatGetTheirFinalNameWhileTheyAreReadAreWhole) {
     std::uint64_t count = 0;
     for (TaskRecord record; merged.next(record);) ++count;
     EXPECT_EQ(count, 40U);
-    EXPECT_THAT(merged.damaged(), IsEmpty());
+    EXPECT_THAT(merged.found().damaged, IsEmpty());
 }
 
 TEST_F(StudyParts, OfAKilledProcessCountAsFarAsTheyGo) {
@@ -256,7 +256,7 @@ TEST_F(StudyParts, OfAKilledProcessCountAsFarAsTheyGo) {
     fs::rename(path, path + ".tmp");
     const StudyStatus status = status_of(folder_);
     EXPECT_EQ(status.done, 5U);
-    EXPECT_THAT(status.damaged, IsEmpty());
+    EXPECT_THAT(status.found.damaged, IsEmpty());
     ASSERT_EQ(status.running.size(), 1U);
     EXPECT_EQ(status.running[0].records, 5U);
     EXPECT_EQ(status_of(folder_, 0).running.size(), 0U);
@@ -276,12 +276,12 @@ TEST_F(StudyParts, WrittenByAClockThatJumpsAreAllThere) {
     const StudyStatus status = status_of(folder_);
     // THEN the one counts as written just now, the other as left, no age is negative, nothing lost
     EXPECT_EQ(status.done, 9U);
-    EXPECT_THAT(status.damaged, IsEmpty());
+    EXPECT_THAT(status.found.damaged, IsEmpty());
     ASSERT_EQ(status.running.size(), 1U);
     EXPECT_EQ(status.running[0].age_s, 0);
     EXPECT_EQ(done_in(folder_.parts(), folder_.id, 40, {}).count, 9U);
     write(range(9, 40));
-    EXPECT_EQ(status_of(folder_).missing, 0U);
+    EXPECT_EQ(status_of(folder_).found.missing_count, 0U);
 }
 
 TEST_F(StudyParts, ThatCannotBeWrittenSayWhy) {

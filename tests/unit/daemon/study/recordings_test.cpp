@@ -86,7 +86,7 @@ class StudyRecordings : public ::testing::Test {
         Merged merged(folder);
         Reduction reduction(folder);
         for (TaskRecord record; merged.next(record);) reduction.add(record.index, record.bytes);
-        return reduction.result(merged.missing_count());
+        return reduction.result(merged.found().missing_count);
     }
     static Json run(const Folder& folder, unsigned threads = 1) {
         RunOptions options;
@@ -235,7 +235,10 @@ TEST_F(StudyRecordings, ProveTheirBudgetsByDrawing) {
               few["coefficients"].dump());
     EXPECT_THAT(complaint([&] { prove("w", "trials = 12345\n", 1); }),
                 HasSubstr("w.toml:6:10: study.trials: found 12345, expected a"));
-    EXPECT_THAT(complaint([&] { prove("n", "runs = 3\n", 1); }), HasSubstr("study.runs: found 3"));
+    // One block tells nothing of how far it is off; what all studies may have is no fault.
+    const Json one = prove("n", "trials = 10000\nruns = 3\n", 1);
+    EXPECT_EQ(one["trials"], 10'000);
+    EXPECT_EQ(one["verdict"], "not stable yet");
     fs::rename(top_ / "lab" / "a", top_ / "lab" / "b");
     EXPECT_THAT(complaint([&] { prove("h", "", 1); }), HasSubstr("study.recording: "));
 }

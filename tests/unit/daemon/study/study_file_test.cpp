@@ -57,6 +57,28 @@ TEST(StudyFile, OfThreeAxesCountsTheFirstSlowest) {
     EXPECT_EQ(combination_of(study, 2), 0U);
 }
 
+TEST(StudyFile, OfOtherKindsMayHaveTheHeadOfAll) {
+    // GIVEN the head of the specification with another kind
+    const std::string head = "[study]\nname = 'a'\nseed = 1\nruns = 1000\n";
+    const Study recordings =
+        parse_study(head + "kind = 'recordings'\nfolders = ['/lab']\n", "S.toml");
+    EXPECT_THAT(recordings.warnings,
+                ::testing::UnorderedElementsAre(
+                    "S.toml:3:8: study.seed: found 1, without effect in a study of kind "
+                    "\"recordings\"",
+                    "S.toml:4:8: study.runs: found 1000, without effect in a study of kind "
+                    "\"recordings\""));
+    // THEN of trials the fewest are a block, whatever runs there are
+    const Study trials = parse_study(
+        head + "kind = 'uncertainty'\nrecording = '/lab/a'\ntrials = 10000\n", "S.toml");
+    EXPECT_EQ(trials.tasks(), 1U);
+    ASSERT_EQ(trials.warnings.size(), 1U);
+    EXPECT_THAT(trials.warnings[0], HasSubstr("study.runs: found 1000, without effect"));
+    EXPECT_THAT(complaint(head + "kind = 'uncertainty'\nrecording = '/lab/a'\ntrials = 9999\n"),
+                HasSubstr("study.trials: found 9999, expected a whole number from 10000"));
+    EXPECT_TRUE(parse_study(kHead, "S.toml").warnings.empty());
+}
+
 TEST(StudyFile, ThatIsWrongIsNamedByPlaceValueAndWhatWasExpected) {
     EXPECT_THAT(
         complaint(kHead + "runs = 1000\n[grid]\n\"campaign.dwell_s\" = " +
@@ -108,8 +130,8 @@ TEST(StudyFile, ThatIsWrongIsNamedByPlaceValueAndWhatWasExpected) {
     EXPECT_THAT(complaint("[study]\nname = 'a'\nkind = 'recordings'\nfolders = ['']\n"),
                 StartsWith("S.toml:4:11: study.folders: found an array of 1"));
     EXPECT_THAT(complaint("[study]\nname = 'a'\nkind = 'recordings'\nfolders = ['/lab']\n"
-                          "runs = 3\n[rig]\n"),
-                AllOf(HasSubstr("study.runs: found 3, expected it not to be set in a study of "
+                          "digits = 3\n[rig]\n"),
+                AllOf(HasSubstr("study.digits: found 3, expected it not to be set in a study of "
                                 "kind \"recordings\""),
                       HasSubstr("rig: found a table")));
     EXPECT_THAT(complaint(kHead + "folders = ['/lab']\n"),

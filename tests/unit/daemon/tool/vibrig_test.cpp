@@ -72,6 +72,50 @@ TEST_F(VibrigOptions, AnOutputIsNoInputAndNoRecording) {
     EXPECT_NE(content("third").find("\"runs\""), std::string::npos);
 }
 
+TEST_F(VibrigOptions, APictureOfAnotherKindIsNoFolder) {
+    // GIVEN names that somebody takes for a picture's, THEN no folder of that name comes of them
+    for (const char* const command :
+         {"plan", "identify x.csv", "uncertainty c", "replay c", "trend 17", "calibrate x.csv",
+          "level simulate", "level design", "zero simulate", "allan x.csv", "study merge s",
+          "reproduce all"}) {
+        for (const char* const name : {"x.png", "deep/x.PDF", "x.jpeg", "x.ps"})
+            expect_refusal(std::string(command) + " --plot " + name,
+                           std::string(name) + ": charts are SVG; expected a");
+        EXPECT_EQ(out, "") << command;
+    }
+    expect_refusal("plan --plot x.html",
+                   "x.html: charts are SVG; expected a name that ends in .svg, or a folder");
+    expect_refusal("study merge s --plot x.svg", "x.svg: charts are SVG; expected a folder");
+    write("rates.csv", "1\n2\n1\n2\n");
+    expect_refusal("allan rates.csv --tau0 1 --plot x.html", "a page is of --live");
+    for (const char* const name : {"x.png", "deep", "x.jpeg", "x.ps", "x.html", "x.svg"})
+        EXPECT_FALSE(std::filesystem::exists(folder_ / name)) << name;
+    // A folder's name may have a point.
+    EXPECT_EQ(vibrig("plan --runs 14 --plot plan.v2"), 0) << error;
+    EXPECT_TRUE(std::filesystem::is_directory(folder_ / "plan.v2"));
+}
+
+TEST_F(VibrigOptions, FramesAreReplayedWhateverTheirFileIsCalled) {
+    const std::string frames = "(1700000000.000000) vcan0 123#0102\n";
+    for (const char* const name : {"x.candump", "x.txt", "x.log"}) {
+        write(name, "# of a bus\n" + frames);
+        EXPECT_EQ(vibrig(std::string("replay ") + name), 2);
+        EXPECT_EQ(error.find("HDF5"), std::string::npos) << error;
+        EXPECT_NE(error.find("dwells.csv"), std::string::npos) << error;
+    }
+    write("other.txt", "of another kind\n");
+    expect_refusal("replay other.txt", "other.txt");
+}
+
+TEST_F(VibrigOptions, WhatStandsInAFileIsPrintable) {
+    write("z.csv", "time_s,turn_x_arcsec\xff,b\n1,2,3\n");
+    expect_refusal("zero z.csv", R"(no column "turn_x_arcsec", found time_s, turn_x_arcsec\xff)");
+    write("z.csv",
+          "time_s,turn_x_arcsec,turn_y_arcsec,turn_z_arcsec,dv_x_mps,dv_y_mps,dv_z_mps\n"
+          "1,\xff\x1b,3,3,3,3,3\n");
+    expect_refusal("zero z.csv", R"(column turn_x_arcsec: "\xff\x1b" found)");
+}
+
 TEST_F(VibrigOptions, WhatCannotBeReadIsNamed) {
     write("cut.json", "{\n  \"parameters\": [1,");
     std::filesystem::create_directories(folder_ / "folder");
@@ -217,15 +261,32 @@ TEST_F(VibrigOptions, CommissioningNamesWhatItCannotTake) {
                        "--baud: Value " + std::string(baud) + " not in range 300 to 4000000");
 }
 
-TEST_F(VibrigOptions, TheDaemonSaysWhenNobodyCanReadWhatItPrints) {
-    write("rig.toml", "clock.source = \"rig\"\ncan.port = \"seqpacket\"\ncan.path = \"@rig\"\n");
-    EXPECT_EQ(run(VIBRIGD, "--config rig.toml --check"), 0) << error;
-    for (const char* const arguments : {"--config rig.toml --check", "--schema", "--init",
-                                        "--print-proto", "--help", "--version"}) {
-        for (const char* const nowhere : {" >/dev/full", " >&-"}) {
-            EXPECT_EQ(run(VIBRIGD, std::string(arguments) + nowhere), 2) << arguments << nowhere;
-            EXPECT_NE(error.find("vibrigd: standard output: cannot be written"), std::string::npos)
-                << arguments << nowhere << error;
+TEST_F(VibrigOptions, EachProgramSaysWhenNobodyCanReadWhatItPrints) {
+    write("rig.toml",
+          "clock.source = \"rig\"\ncan.port = \"seqpacket\"\ncan.path = \"@rig\"\n"
+          "guard.socket = \"@guard\"\n");
+    struct Program {
+        const char* name;
+        std::string file;
+        std::vector<std::string> arguments;
+    };
+    for (const auto& [name, file, own] : std::vector<Program>{
+             {"vibrigd",
+              VIBRIGD,
+              {"--config rig.toml --check", "--schema", "--init", "--print-proto"}},
+             {"vibrig-guard", VIBRIG_GUARD, {"--config rig.toml --check"}},
+             {"vibrig-plant", VIBRIG_PLANT, {"--print-dbc"}},
+             {"vibrig", VIBRIG, {"identify --help"}}}) {
+        std::vector<std::string> all{"--help", "--version", "--command-tree"};
+        all.insert(all.end(), own.begin(), own.end());
+        for (const std::string& arguments : all) {
+            EXPECT_EQ(run(file, arguments), 0) << name << arguments << error;
+            for (const char* const nowhere : {" >/dev/full", " >&-"}) {
+                EXPECT_EQ(run(file, arguments + nowhere), 2) << name << arguments << nowhere;
+                EXPECT_NE(error.find(std::string(name) + ": standard output: cannot be written"),
+                          std::string::npos)
+                    << arguments << nowhere << error;
+            }
         }
     }
 }

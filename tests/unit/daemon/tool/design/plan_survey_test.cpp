@@ -12,6 +12,7 @@
 
 namespace {
 
+using vibrig::plan::testing::as_the_table;
 using vibrig::plan::testing::SurveyCommand;
 using vibrig::plan::testing::SurveyJson;
 namespace spectrum = vibrig::estimator::spectrum;
@@ -48,7 +49,7 @@ TEST_F(SurveyCommand, PlansTheSurveyOf63Dwells) {
     // 2.8 h with gaps
     EXPECT_NEAR(plan["duration_s"].get<double>() / 3600, 2.1, 0.8);
     // AND vibrigd's reader takes the file
-    const auto runs = vibrig::plan::read_plan(path("plan.json"), 1);
+    const auto runs = vibrig::plan::read_plan(path("plan.json"), as_the_table);
     ASSERT_EQ(runs.size(), plan["runs"].size());
     for (std::size_t i = 0; i < runs.size(); ++i)
         EXPECT_EQ(runs[i].frequency_hz, plan["runs"][i].value("frequency_hz", 0.0)) << i;
@@ -57,6 +58,24 @@ TEST_F(SurveyCommand, PlansTheSurveyOf63Dwells) {
     ASSERT_EQ(vibrig("plan --evaluate plan.json --config hard.toml --json"), 0) << error;
     EXPECT_EQ(json()["runs"], plan["runs"]);
     EXPECT_NEAR(json()["duration_s"], plan["duration_s"].get<double>(), 1e-6);
+    // AND without a configuration, too: it says itself what it stands on
+    ASSERT_EQ(vibrig("plan --evaluate plan.json --json"), 0) << error;
+    EXPECT_EQ(json()["runs"], plan["runs"]);
+    EXPECT_EQ(json()["transmission"], 1);
+    // but not against one that says otherwise
+    write("pads.toml", "vibration.transmission = 0.6667\n");
+    EXPECT_EQ(vibrig("plan --evaluate plan.json --config pads.toml"), 2);
+    EXPECT_NE(error.find("platform over table to be the transmission"), std::string::npos) << error;
+}
+
+TEST_F(SurveyCommand, OnOtherIsolatorsIsJudgedOnThem) {
+    write("soft.toml", "vibration.transmission = 0.5\n");
+    ASSERT_EQ(vibrig("plan --frequencies 15,25 --config soft.toml --json -o plan.json"), 0)
+        << error;
+    const SurveyJson plan = json();
+    ASSERT_EQ(vibrig("plan --evaluate plan.json --json"), 0) << error;
+    EXPECT_EQ(json()["runs"], plan["runs"]);
+    EXPECT_NEAR(json()["transmission"].get<double>(), 0.5, 1e-4);
 }
 
 TEST_F(SurveyCommand, SaysWhatIsMovedAndWhatTheLimitsLeave) {
@@ -187,15 +206,13 @@ TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
     EXPECT_TRUE(refuses(sweep(R"(,"frequency_hz":15)", "20", "120", "99"),
                         "found 15.0 Hz beside a sweep, expected one of them"))
         << error;
-    EXPECT_TRUE(refuses(sweep("", "20", "120", "99"), "sweeps are for vibrigd's campaigns"))
-        << error;
     EXPECT_TRUE(refuses(bare + R"(,"profile":"truck","sweep":{"s":9}}]})",
                         "runs[0].sweep: found {\"s\":9} beside a profile"))
         << error;
     EXPECT_TRUE(refuses(at + R"(,"role":"test"}]})", "\"identify\" or \"verify\"")) << error;
     write("plan.csv",
           "alpha_deg,beta_deg,gamma_deg,level_g,frequency_hz\n0,0,0,6,35.1\n0,0,45,0,0\n");
-    const auto runs = vibrig::plan::read_plan(path("plan.csv"), 1);
+    const auto runs = vibrig::plan::read_plan(path("plan.csv"), as_the_table);
     ASSERT_EQ(runs.size(), 2U);
     EXPECT_EQ(runs[0].frequency_hz, 35.1);
     EXPECT_EQ(runs[1].frequency_hz, 0);
@@ -257,8 +274,7 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     const auto refusal = [&](const std::string& row) -> std::string {
         write("plan.csv", head + row + "\n");
         try {
-            static_cast<void>(
-                vibrig::plan::read_plan(path("plan.csv"), [](auto) { return std::optional(1.0); }));
+            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
         } catch (const vibrig::plan::PlanFileError& refused) {
             return std::string(refused.what()).substr(path("plan.csv").size());
         }
@@ -292,7 +308,7 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     const auto column = [&](const std::string& name) -> std::string {
         write("plan.csv", "alpha_deg,beta_deg,gamma_deg,table_g," + name + "\n0,0,0,6,2\n");
         try {
-            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
+            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
         } catch (const vibrig::plan::PlanFileError& refused) {
             return std::string(refused.what()).substr(path("plan.csv").size());
         }
@@ -313,7 +329,7 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     EXPECT_EQ(column("frequency_hz,freq_hz"), "");
     write("plan.csv", head + "0,0,0,,,broad,0,,,,\n");
     try {
-        static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
+        vibrig::plan::refuse_random(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
         ADD_FAILURE() << "taken";
     } catch (const vibrig::plan::PlanFileError& refused) {
         EXPECT_NE(std::string(refused.what()).find("plan.csv:3: column profile: found broad"),

@@ -44,10 +44,12 @@ TEST_F(PlanCommand, MakesPlansWhoseFileComesBackUnchanged) {
     EXPECT_NEAR(json()["duration_s"], plan["duration_s"].get<double>(), 1e-6);
     EXPECT_EQ(json()["runs"], plan["runs"]);
     // AND so it is for vibrigd
-    const auto runs = vibrig::plan::read_plan((folder_ / "plan.json").string(), 0.6667);
-    EXPECT_EQ(runs.size(), plan["runs"].size());
-    EXPECT_THROW(static_cast<void>(vibrig::plan::read_plan((folder_ / "plan.json").string(), 0.9)),
-                 vibrig::plan::PlanFileError)
+    const auto runs = [&](double transmission) {
+        return vibrig::plan::read_plan((folder_ / "plan.json").string(),
+                                       [=](auto) { return std::optional(transmission); });
+    };
+    EXPECT_EQ(runs(0.6667).size(), plan["runs"].size());
+    EXPECT_THROW(static_cast<void>(runs(0.9)), vibrig::plan::PlanFileError)
         << "another transmission than the file's";
 }
 
@@ -175,6 +177,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
     write("hz.json", R"({"frequency_hz":30,"runs":[)" + run + "}]}");
     write("pads.json", R"({"transmission":0.9,"runs":[)" + run + "}]}");
     write("limit.toml", "shaker.limits.acceleration_g = 5\n");
+    write("rig.toml", "vibration.transmission = 0.6667\n");
     struct Case {
         const char* arguments;
         const char* words;
@@ -199,7 +202,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
                "plan.frequency_hz: found 30.0 Hz, and runs without one of "
                "their own, expected the configuration's "
                "vibration.frequency_hz, 15.0 Hz"},
-          Case{"--evaluate pads.json",
+          Case{"--evaluate pads.json --config rig.toml",
                "plan.transmission: found 0.9, expected the configuration's"},
           Case{"--evaluate cut.json", "cut.json: not JSON: parse error at line 1, column 16\n"},
           Case{"--evaluate levels.json", "transmission 0.6667"},

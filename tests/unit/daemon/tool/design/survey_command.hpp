@@ -14,6 +14,9 @@ namespace vibrig::plan::testing {
 
 using SurveyJson = nlohmann::json;
 
+/// The platform shakes as the table does.
+inline std::optional<double> as_the_table(std::optional<double> /*hz*/) { return 1; }
+
 class SurveyCommand : public test::VibrigCommand {
   protected:
     SurveyJson json() const { return SurveyJson::parse(out); }
@@ -21,7 +24,7 @@ class SurveyCommand : public test::VibrigCommand {
     bool refuses(const std::string& plan, const std::string& words) {
         write("bad.json", plan);
         try {
-            static_cast<void>(read_plan(path("bad.json"), 1));
+            refuse_random(read_plan(path("bad.json"), as_the_table));
         } catch (const PlanFileError& refusal) {
             error = refusal.what();
             return error.find(words) != std::string::npos;

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "daemon/serve/status_json.hpp"
 #include "daemon/serve/status_server.hpp"
@@ -98,7 +99,12 @@ TEST_F(Tool, SendsCommandsAndReportsRefusals) {
     const Outcome refused = vibrig("start" + at);
     EXPECT_EQ(refused.code, 1);
     EXPECT_EQ(refused.output, "vibrig: the shaker is not armed\n");
-    EXPECT_EQ(vibrig("ack" + at).code, 2) << "what?";
+    const Outcome nothing = vibrig("ack --by Ada" + at);
+    EXPECT_EQ(nothing.code, 2);
+    EXPECT_NE(nothing.output.find("found nothing to acknowledge, expected trip, shaker, or the "
+                                  "name of an alarm"),
+              std::string::npos)
+        << nothing.output;
     EXPECT_EQ(vibrig("arm --by ''" + at).code, 2);
     EXPECT_EQ(source.requests().size(), 7u);
 }
@@ -166,6 +172,34 @@ TEST_F(Tool, WatchesUntilTheCampaignEnds) {
     status.verdict.level = 2;
     show(status);
     EXPECT_EQ(vibrig(watch).code, 1);
+}
+
+TEST_F(Tool, WatchesAsJsonLineByLine) {
+    const StatusServer server(source, path);
+    StatusData status = full_status();
+    status.state = CampaignState::recording;
+    show(status);
+    const std::string before = status_json(source.status());
+    Outcome outcome;
+    {
+        const std::jthread watcher(
+            [&] { outcome = vibrig("watch --json --until-finished --interval 0.05" + at); });
+        wait_until_asked();
+        status.state = CampaignState::finished;
+        source.set(status);
+    }
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    // THEN each line is what `vibrig status --json` prints, and the verdict stands on standard
+    // error
+    const std::string after = status_json(source.status());
+    std::vector<std::string> said;
+    std::istringstream lines(outcome.output);
+    for (std::string line; std::getline(lines, line);)
+        if (!line.starts_with("verdict: ")) said.push_back(line);
+    ASSERT_GE(said.size(), 2U) << outcome.output;
+    EXPECT_EQ(said.front(), before);
+    EXPECT_EQ(said.back(), after);
+    for (const auto& line : said) EXPECT_TRUE(line == before || line == after) << line;
 }
 
 TEST_F(Tool, WatchFindsARestartedDaemonAgain) {

@@ -2,9 +2,9 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
+#include "daemon/papers/reproduce.hpp"
 #include "estimator/filter/settings.hpp"
 
 namespace vibrig::tool::tang2009 {
@@ -52,5 +52,12 @@ struct Study {
 [[nodiscard]] const Coefficients& truth();
 /// One study for each scale; every seed is a rig of its own, seeds 1 ... n.
 [[nodiscard]] std::vector<Study> run_studies(const std::vector<double>& scales, std::size_t seeds);
+
+/// Charts like the paper's Figure 3, one for each trial, gyro and route of a study.
+void add_convergence(const Study& study, Reproduction& table);
+/// Eqs 3-7: transmission of the isolators and its transient, against the integrated equation 1.
+void add_transmission(Reproduction& table);
+/// Section 3.5: what errors of the accelerometers do to the level.
+void add_level_errors(Reproduction& table);
 
 }  // namespace vibrig::tool::tang2009

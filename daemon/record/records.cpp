@@ -1,4 +1,4 @@
-#include "daemon/record/dwell_numbers.hpp"
+#include "daemon/record/records.hpp"
 
 #include <algorithm>
 #include <cmath>
