@@ -165,7 +165,7 @@ class Kill:
             self.rig.tool("ack", "shaker", "--by", "test")
             status = self.rig.wait_for(lambda s: s["shaker"].get("state") == 0, 0.5)
         if status is not None and status["campaign"]["state"] == "tripped":
-            self.rig.tool("ack", "trip", "--by", "test")
+            self.rig.acknowledge(by="test")
         status = self.rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 30)
         self.how = "resume" if status and status["campaign"].get("resume_offer") and self.rng.random() < 0.7 else "start"
         self.state = "just begun"

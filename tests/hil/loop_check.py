@@ -86,7 +86,7 @@ def in_band(checks, programs, folder):
         rig.tool("abort", "--by", "Ada")
         rig.wait_for(lambda s: s["campaign"]["state"] == "aborted" and not s["shaker"].get("running"), 60)
         # aborted in the midst of it
-        rig.tool("ack", "trip", "--by", "Ada")
+        rig.acknowledge(by="Ada")
         begun = subprocess.Popen([rig.program("vibrig"), "selftest", "--by", "Grace", "--socket", rig.socket],
                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         status = rig.wait_for(running, 60)

@@ -253,7 +253,7 @@ def shakes(checks, rig, what):
     status = rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") == 0 and
                           not s["shaker"].get("running", True), 30)
     if status["campaign"]["state"] == "tripped":
-        rig.tool("ack", "trip", "--by", "tester")
+        rig.acknowledge()
     said = [rig.tool(command, "--by", "tester").stderr for command in ("arm", "start")]
     status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
     checks.check(status is not None and status["campaign"]["state"] == "recording", f"{what}: the table shakes",
@@ -327,7 +327,7 @@ def upgrades(checks, rig, package):
     output("systemctl", "restart", UNIT)
     before, pid = digest(*kept), int(prop("MainPID"))
     rig.wait_for(lambda s: r.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
-    rig.tool("ack", "trip", "--by", "tester")   # what was killed and hung has latched
+    rig.acknowledge()   # what was killed and hung has latched
     rig.wait_for(lambda s: s["campaign"]["state"] != "tripped" and not s["shaker"].get("stop_pending"), 30)
     armed = rig.arm()
     checks.check(armed.returncode == 0, "armed again", armed.stderr)

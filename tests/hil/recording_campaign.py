@@ -108,7 +108,7 @@ def resumed(checks, rig):
     rig.wait_for(lambda s: s["campaign"].get("resume_offer") and s["shaker"].get("running") is False and
                  s["shaker"].get("state") == 0 and r.measuring(s), 60)
     if rig.status()["campaign"]["state"] == "tripped":   # the shaker was left running
-        rig.tool("ack", "trip", "--by", "test")
+        rig.acknowledge(by="test")
     runs = [rig.tool(command, "--by", "test") for command in ("arm", "resume")]
     status = rig.wait_for_state(("finished", "aborted", "tripped"), 120)
     checks.equal(r.state_of(status), "finished", "resumed: the campaign finishes")

@@ -68,7 +68,7 @@ def checks_rest(status):
 def clear(rig):
     """A shaker left running trips the interlock, which latches."""
     if rig.status()["campaign"]["state"] == "tripped":
-        rig.tool("ack", "trip", "--by", "tester")
+        rig.acknowledge(by="tester")
 
 
 def take_up(checks, rig, what, count):

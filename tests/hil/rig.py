@@ -213,6 +213,15 @@ class Rig:
             armed = self.tool("arm", "--by", by)
         return armed
 
+    def acknowledge(self, what="trip", by="tester", timeout_s=30):
+        """Once rest is measured, by accelerometers that are seen to live after an end while armed: that is waited for."""
+        end = time.monotonic() + timeout_s
+        said = self.tool("ack", what, "--by", by)
+        while said.returncode != 0 and "a stop is under way" in said.stderr and time.monotonic() < end:
+            time.sleep(0.2)
+            said = self.tool("ack", what, "--by", by)
+        return said
+
     def order(self, line, timeout_s=10):
         """Given to the plant, and done when this returns: its answer."""
         known = len(self.plant.text())

@@ -97,7 +97,7 @@ def blocked(checks, rig, manager, stage):
     checks.check("READY=1" in heard, f"{stage}: the daemon says that it is ready", rig.logs())
     rig.wait_for(r.measuring, 20)
     if rig.status()["campaign"]["state"] == "tripped":
-        rig.tool("ack", "trip", "--by", "tester")
+        rig.acknowledge(by="tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
     for command in ("arm", "start"):
         done = rig.tool(command, "--by", "tester")
@@ -150,7 +150,7 @@ def restarts_at_rest(checks, rig, manager):
     start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
     rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") == 0, 20)
     if rig.status()["campaign"]["state"] == "tripped":
-        rig.tool("ack", "trip", "--by", "tester")
+        rig.acknowledge(by="tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
     checks.equal(rig.tool("arm", "--by", "tester").returncode, 0, "upgrade: armed")
     with open(request, "w", encoding="ascii"):

@@ -39,7 +39,7 @@ StatusData full_status() {
     s.shaker_counters = {11, 12, 13, 14, 15, 16, 17, 18, 19};
     s.can = drivers::PortState::running;
     s.can_counters = {21, 22, 23, 24, 25, 26, 27, 28, 29};
-    s.assembler = {31, 32, 33, 34, 35, 36, 37, 38, 39, 40};
+    s.assembler = {31, 32, 33, 34, 35, 36, 37, 38, 231, 232, 233, 39, 40};
     s.estimator_ring = {41, 42, 43};
     s.estimator_in_dwell = 30;
     s.estimator_idle = 12;
