@@ -208,7 +208,9 @@ int send_command(const CommandOptions& options) {
             "what: found nothing to acknowledge, expected trip, shaker, or the name of an alarm or "
             "of what is latched, as `vibrig status` has them");
     serve::Client client(options.at);
-    if (options.kind == v1::Command::arm) wait_for_rest(client);
+    // Who types the one right after the other is not refused because of a stop on its way.
+    if (options.kind == v1::Command::arm || options.kind == v1::Command::acknowledge)
+        wait_for_rest(client);
     const serve::Reply reply = client.post(
         "/api/v1/commands", json_of(command_of(options.kind, options.by, options.argument)));
     if (options.json) std::cout << reply.body << '\n';
