@@ -130,7 +130,7 @@ def killed_at_random(checks, rig, journal, seed):
         names = rig.latches()
         if names is None or "journal" in names:
             latched.append((number, names))
-        rig.acknowledge(by="Ada")
+        rig.tool("ack", "trip", "--by", "Ada")
     checks.equal(broken, [], f"{KILLS} times SIGKILL (seed {seed}): it verifies each time")
     checks.equal(latched, [], "and the next start finds nothing")
 
