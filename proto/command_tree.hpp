@@ -60,7 +60,7 @@ using Json = nlohmann::ordered_json;
 }
 
 /// Exit status of a program that only prints: nobody may take half of it, or nothing, for all.
-[[nodiscard]] inline int printed(const CLI::App& app) {
+[[nodiscard]] inline int print_status(const CLI::App& app) {
     if (std::cout.flush()) return 0;
     std::cerr << app.get_name() << ": standard output: cannot be written\n";
     return 2;

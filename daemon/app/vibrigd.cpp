@@ -254,12 +254,12 @@ int main(int argc, char** argv) {
     vibrig::proto::refuse_empty_values(app);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(app, kExits);
-        return vibrig::proto::printed(app);
+        return vibrig::proto::print_status(app);
     }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
+        return app.exit(error) == 0 ? vibrig::proto::print_status(app) : 2;
     }
 
     // Blocked before any thread starts, so that sigwait in the main thread gets them all.
@@ -276,13 +276,13 @@ int main(int argc, char** argv) {
         for (const Print& print : printable) {
             if (!print.asked) continue;
             std::cout << print.words();
-            return vibrig::proto::printed(app);
+            return vibrig::proto::print_status(app);
         }
         auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_certificates(loaded);
         if (check) {
             print_check(loaded);
-            return vibrig::proto::printed(app);
+            return vibrig::proto::print_status(app);
         }
         const auto& file = loaded.configuration.log_file;
         const int descriptor = file.empty() ? STDERR_FILENO : vibrig::log::open_log_file(file);

@@ -83,12 +83,12 @@ int main(int argc, char** argv) {
                    "what may be over with a later start: a name that is not resolved yet, a "
                    "place that another guard still has"},
                   {2, "bad usage or configuration"}});
-        return vibrig::proto::printed(app);
+        return vibrig::proto::print_status(app);
     }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
+        return app.exit(error) == 0 ? vibrig::proto::print_status(app) : 2;
     }
     std::signal(SIGPIPE, SIG_IGN);
     try {
@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
         if (check) {
             const vibrig::guard::Witnesses witnesses(settings.witness);
             std::cout << settings.believed;
-            return vibrig::proto::printed(app);
+            return vibrig::proto::print_status(app);
         }
         run(settings);
         return 0;

@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(
             app, {{0, "done"}, {1, "the result says no"}, {kBadInput, "bad usage or input"}});
-        return vibrig::proto::printed(app);
+        return vibrig::proto::print_status(app);
     }
     // Of a word that it does not know CLI11 says only that there should be a command.
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         // CLI11 has codes of its own for each kind of bad usage; people and scripts get one.
-        return app.exit(error) == 0 ? vibrig::proto::printed(app) : kBadInput;
+        return app.exit(error) == 0 ? vibrig::proto::print_status(app) : kBadInput;
     } catch (const std::exception& error) {
         std::cerr << "vibrig: " << error.what() << '\n';
         return kBadInput;

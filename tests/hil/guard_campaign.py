@@ -164,13 +164,17 @@ def arms_and_starts(checks, rig, what):
     checks.check(done.returncode == 0, f"{what}: start", done.stderr + rig.logs())
 
 
-def starts(checks, rig, what):
-    """Daemon and guard; the table shakes at 5 g."""
+def meet_and_start(checks, rig, what):
     rig.start_guard()
     rig.start_daemon()
     status = rig.wait_for(watching, SOON)
     checks.check(status is not None and watching(status), f"{what}: daemon and guard have found each other", rig.logs())
     arms_and_starts(checks, rig, what)
+
+
+def starts(checks, rig, what):
+    """Daemon and guard; the table shakes at 5 g."""
+    meet_and_start(checks, rig, what)
     status = rig.wait_for_state(("recording", "aborted", "tripped"), 2 * SOON)
     checks.check(status is not None and status["campaign"]["state"] == "recording" and rig.shakes(), f"{what}: the table shakes",
                  r.state_of(status) + rig.logs())
@@ -494,11 +498,7 @@ def fast(checks, programs, folder):
 
 
 def finishes(checks, rig, what):
-    rig.start_guard()
-    rig.start_daemon()
-    status = rig.wait_for(watching, SOON)
-    checks.check(status is not None and watching(status), f"{what}: daemon and guard have found each other", rig.logs())
-    arms_and_starts(checks, rig, what)
+    meet_and_start(checks, rig, what)
     status = rig.wait_for_state(("finished", "aborted", "tripped"), 4 * SOON)
     checks.check(status is not None and status["campaign"]["state"] == "finished", f"{what}: the campaign finishes",
                  r.state_of(status) + rig.logs())

@@ -35,11 +35,11 @@ int main(int argc, char** argv) {
             app, {{0, "done; judge: all coefficients within the limit"},
                   {1, "judge: not so"},
                   {2, "bad usage or input"}});
-        return vibrig::proto::printed(app);
+        return vibrig::proto::print_status(app);
     }
     if (argc == 2 && std::string_view(argv[1]) == "--print-dbc") {
         std::cout << vibrig::proto::rig_dbc_text();
-        return vibrig::proto::printed(app);
+        return vibrig::proto::print_status(app);
     }
     try {
         // "vibrig-plant --can ..." means run.
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
         std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
         app.parse(arguments);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? vibrig::proto::printed(app) : 2;
+        return app.exit(error) == 0 ? vibrig::proto::print_status(app) : 2;
     } catch (const std::exception& error) {
         std::fprintf(stderr, "vibrig-plant: %s\n", error.what());
         return 2;
