@@ -10,6 +10,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
+#include "estimator/uncertainty/beside_drift.hpp"
 #include "estimator/uncertainty/breaks.hpp"
 #include "estimator/uncertainty/coverage.hpp"
 #include "estimator/uncertainty/distributions.hpp"
@@ -134,6 +135,21 @@ Tested tested_with(const Settings& settings, DwellTable table, std::span<const D
     auto gyros = gyros_of(table, settings);
     declare(declared, gyros);
     return {table, std::move(gyros), NullFit(table, declared, prior, freed.determined)};
+}
+
+void take_fit(const Settings& settings, const NullFit& fit, Assessment& out) {
+    out.chi_square = fit.chi_square();
+    out.degrees = fit.degrees();
+    if (out.degrees <= 0) return;
+    const double mean = out.chi_square / out.degrees;
+    out.birge = std::sqrt(mean);
+    // Noise that is known to a relative r: 1/2 (1/r)^2 degrees of freedom.
+    if (out.degrees >= 9) out.p = f_tail(mean, out.degrees, settings.uncertainty.noise_dof);
+}
+
+bool names_a_drift(const std::vector<Evidence>& evidence) {
+    return !evidence.empty() && evidence.front().named() &&
+           !is_structural(evidence.front().pattern);
 }
 
 struct TypeB {
@@ -281,13 +297,13 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         out.times_assumed = table.times_assumed;
         const VectorXd prior = prior_information(settings);
         Averaged of = averaged(table, settings);
-        const Freed freed =
-            determine_freed(settings, table, ForwardModel(settings, of.coefficients), prior);
+        const Freed freed = determine_freed(settings, table, of.coefficients, prior);
         if (!freed.list.empty()) {
             table.rows = freed.rows;
             of = averaged(table, settings);
         }
         out.freed = freed.list;
+        out.freed_settled = freed.list.empty() || freed.settled;
         out.drift = of.drift;
         const ForwardModel model(settings, of.coefficients);
         const Inputs declared = without(settings.uncertainty, settings.free);
@@ -303,14 +319,7 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         const Tested tested = in_doubt.empty()
                                   ? Tested{table, of.gyros, fit}
                                   : tested_with(settings, table, in_doubt, scaled, prior, freed);
-        out.chi_square = tested.fit.chi_square();
-        out.degrees = tested.fit.degrees();
-        if (out.degrees > 0) out.birge = std::sqrt(out.chi_square / out.degrees);
-        if (out.degrees >= 9) {
-            // Noise that is known to a relative r: 1/2 (1/r)^2 degrees of freedom.
-            out.p =
-                f_tail(out.chi_square / out.degrees, out.degrees, settings.uncertainty.noise_dof);
-        }
+        take_fit(settings, tested.fit, out);
         Together all = join(out.drift, fit, table.dwells());
         widen_constant(settings, out, all);
         freed.put_into(all.gain, all.covariance);
@@ -323,6 +332,12 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         tell_rates(table, fit.residual(all.value), fit.residual_variance(inputs.rates.cols()), out);
         if (out.degrees >= 9)
             out.evidence = weigh_patterns(tested.table, tested.fit, out.ramps, model, tested.gyros);
+        if (names_a_drift(out.evidence)) {
+            out.beside_drift = weigh_beside_drift({tested.table, of.gyros, out.drift,
+                                                   settings.drift, scaled, prior, freed.determined},
+                                                  model);
+            for (Evidence& e : out.beside_drift) e.change = out.gain * e.rates;
+        }
         const TypeB b = propagate(settings, all, inputs.rates, u, out.sync_bound);
         out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);

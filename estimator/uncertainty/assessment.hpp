@@ -94,10 +94,13 @@ struct Assessment {
     RampFit ramps;
     double birge = 1, widening = 1;
     std::vector<Evidence> evidence;  ///< the best first
+    /// Where a state of the drift is named: the structural ones with that beside them.
+    std::vector<Evidence> beside_drift;
     BiasModel model = BiasModel::automatic;
     std::array<DriftAverage, 3> drift;
     std::vector<FreedUnknown> freed;
-    double worst_step = 1;  ///< largest inflation of a sigma by one free step
+    bool freed_settled = true;  ///< what is freed could be found
+    double worst_step = 1;      ///< largest inflation of a sigma by one free step
     std::vector<CrossAxis> cross_axis;
     double sync_arcsec = 0, sync_bound = 0;  ///< deg/h/g^2
     std::vector<DwellRate> rates;

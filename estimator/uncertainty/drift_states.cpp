@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/rates_covariance.hpp"
@@ -22,6 +23,8 @@ constexpr Index kFirstLinear = 1;  ///< of the three linear terms
 /// With fewer rates to spare the data cannot tell one hypothesis from another.
 constexpr Index kFewestDwells = 12;
 constexpr double kLeastWeight = 1e-12;  ///< less moves no digit
+constexpr double kLeastBeside = 1e-3;   ///< of a hypothesis beside which others are weighed
+constexpr int kWalkTerms = 40;
 
 /// v less its mean.
 VectorXd about_mean(const VectorXd& v) { return v.array() - v.mean(); }
@@ -234,9 +237,9 @@ double trend_of(const GyroRates& gyro, const Kernels& kernels, const DriftHypoth
     return fit.amplitude(gyro, kernels.time, size * size).first / span_h;
 }
 
-/// Weights of the hypotheses after the rates, their sum 1.
-std::vector<double> weigh(const GyroRates& gyro, const Kernels& kernels,
-                          const std::vector<Weighted>& list) {
+/// Weights of the hypotheses after the rates, their sum 1, and the logarithm of what it was.
+std::pair<std::vector<double>, double> weigh(const GyroRates& gyro, const Kernels& kernels,
+                                             const std::vector<Weighted>& list) {
     std::vector<double> weights;
     for (const Weighted& one : list)
         weights.push_back(Fit(gyro, kernels.covariance(gyro, one.what)).log_likelihood +
@@ -245,7 +248,7 @@ std::vector<double> weigh(const GyroRates& gyro, const Kernels& kernels,
     double sum = 0;
     for (double& w : weights) sum += w = std::exp(w - largest);
     for (double& w : weights) w /= sum;
-    return weights;
+    return {std::move(weights), largest + std::log(sum)};
 }
 
 bool is_step(const DriftHypothesis& what) {
@@ -290,8 +293,9 @@ double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseIn
 DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     const Kernels kernels(gyro);
     const std::vector<Weighted> list = hypotheses(gyro, drift, kernels.s0);
-    const std::vector<double> weights = weigh(gyro, kernels, list);
+    const auto [weights, log_evidence] = weigh(gyro, kernels, list);
     DriftAverage out;
+    out.log_evidence = log_evidence;
     const Index terms = gyro.regressors.cols();
     out.value = VectorXd::Zero(terms);
     out.covariance = MatrixXd::Zero(terms, terms);
@@ -344,6 +348,29 @@ MatrixXd mean_covariance(const GyroRates& gyro, const DriftAverage& average) {
                          (std::min(kernels.elapsed[i], kernels.elapsed[k]) - mean[i] - mean[k] +
                           mean.mean());
     }
+    return out;
+}
+
+DriftColumns drift_columns(const GyroRates& gyro, const DriftAverage& average) {
+    const Kernels kernels(gyro);
+    DriftColumns out;
+    double walk = 0;
+    std::vector<VectorXd> list;
+    for (const auto& [what, weight] : average.likeliest) {
+        if (weight < kLeastBeside) continue;
+        out.scatter += weight * kernels.s0 * kernels.s0 * what.scatter * what.scatter;
+        walk += weight * kernels.s0 * kernels.s0 * what.walk * what.walk;
+        const MatrixXd columns = kernels.columns(gyro, what);
+        for (Index c = 0; c < columns.cols(); ++c)
+            list.emplace_back(std::sqrt(weight) * columns.col(c));
+    }
+    // A walk by its series (Karhunen and Loeve): what 40 terms leave is 1/(40 pi^2) of it.
+    for (int k = 0; walk > 0 && k < std::min<Index>(kWalkTerms, gyro.dwells()); ++k) {
+        const double turns = (k + 0.5) * std::numbers::pi;
+        list.emplace_back(std::sqrt(2 * walk) / turns * (turns * kernels.elapsed).array().sin());
+    }
+    out.columns.resize(gyro.dwells(), static_cast<Index>(list.size()));
+    for (std::size_t c = 0; c < list.size(); ++c) out.columns.col(static_cast<Index>(c)) = list[c];
     return out;
 }
 

@@ -50,6 +50,7 @@ struct DriftAverage {
     Eigen::VectorXd value;       ///< 10
     Eigen::MatrixXd covariance;  ///< 10 x 10
     Eigen::MatrixXd gain;        ///< value = gain * rates
+    double log_evidence = 0;     ///< of the rates, over all hypotheses; of the same n dwells
     DriftWeights weights;
     DriftStep step;
     double trend_deg_h_h = 0;  ///< steady, over all hypotheses; what walks is not in it
@@ -66,6 +67,14 @@ struct DriftAverage {
 /// Covariance of the rates about their model, n x n: noise, and what the bias may have done by
 /// `average`.
 [[nodiscard]] Eigen::MatrixXd mean_covariance(const GyroRates& gyro, const DriftAverage& average);
+
+/// The same, as a regression takes it: what scatters from dwell to dwell, (deg/h)^2, and columns of
+/// unit prior variance, n x m with m at most 40 and a few whatever n is.
+struct DriftColumns {
+    double scatter = 0;
+    Eigen::MatrixXd columns;
+};
+[[nodiscard]] DriftColumns drift_columns(const GyroRates& gyro, const DriftAverage& average);
 
 /// Logarithm of the likelihood ratio of a covariance with these sizes of scatter and walk over that
 /// of noise alone, for the same rates.

@@ -53,7 +53,8 @@ void take_size(Evidence& out, const Signatures& of, const NullFit& fit,
     const VectorXd p = covariance * projection.s;
     out.elements = of.elements;
     out.unit = of.unit;
-    out.change = fit.change(of.z * p);
+    out.rates = of.z * p;
+    out.change = fit.change(out.rates);
     out.size.clear();
     out.sigma.clear();
     for (Index i = 0; i < p.size(); ++i) {
@@ -62,15 +63,6 @@ void take_size(Evidence& out, const Signatures& of, const NullFit& fit,
     }
     out.smallest_seen =
         kSeen * of.size / std::sqrt(std::max(projection.f.diagonal().maxCoeff(), 1e-300));
-}
-
-Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit) {
-    Evidence out;
-    out.pattern = pattern;
-    const auto projection = fit.project(of.z);
-    out.log_odds = log_mean(log_odds(projection));
-    take_size(out, of, fit, projection);
-    return out;
 }
 
 /// A step at any place from `first` to n - first.
@@ -147,6 +139,35 @@ const char* name_of(Pattern pattern) noexcept {
     const auto i = static_cast<std::size_t>(pattern);
     return i < kStructuralNames.size() ? kStructuralNames[i]
                                        : kOfStates[i - kStructuralNames.size()];
+}
+
+Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit) {
+    Evidence out;
+    out.pattern = pattern;
+    const auto projection = fit.project(of.z);
+    out.log_odds = log_mean(log_odds(projection));
+    take_size(out, of, fit, projection);
+    return out;
+}
+
+double log_occam(const Signatures& of, const NullFit& fit, const Evidence& found) {
+    const auto [values, vectors] = linear_algebra::symmetric_eigen(fit.project(of.z).f);
+    VectorXd sizes(of.z.cols());
+    for (Index i = 0; i < sizes.size(); ++i)
+        sizes[i] = found.size[static_cast<std::size_t>(i)] / of.size;
+    const VectorXd p = vectors.transpose() * sizes;
+    const double least = std::max(kLeastEigenvalue, kLeastShare * values.maxCoeff());
+    std::vector<double> logs;
+    for (const double q : kSizes) {
+        double sum = 0;
+        for (Index i = 0; i < p.size(); ++i) {
+            if (values[i] < least) continue;
+            sum -=
+                0.5 * std::log1p(q * q * values[i]) + 0.5 * p[i] * p[i] / (q * q + 1 / values[i]);
+        }
+        logs.push_back(sum);
+    }
+    return log_mean(logs);
 }
 
 bool is_structural(Pattern pattern) noexcept { return pattern <= Pattern::cubic; }

@@ -87,6 +87,7 @@ struct Evidence {
     std::vector<std::string> elements;
     std::vector<double> size, sigma;  ///< in `unit`
     const char* unit = "";
+    Eigen::VectorXd rates;     ///< of this size, 3 n
     Eigen::VectorXd change;    ///< of the coefficients of constant bias, filter order
     double smallest_seen = 0;  ///< of its best seen unknown, with 90 %
 
@@ -94,6 +95,11 @@ struct Evidence {
     /// Odds enough to be named.
     [[nodiscard]] bool named() const { return log_odds > kNamedFrom; }
 };
+
+/// One pattern by its signatures.
+[[nodiscard]] Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit);
+/// Logarithm of what the prior of a pattern's unknowns leaves of its likelihood at their best.
+[[nodiscard]] double log_occam(const Signatures& of, const NullFit& fit, const Evidence& found);
 
 /// All patterns, the best first. `coefficients`: filter order, with which signatures are taken.
 [[nodiscard]] std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit,

@@ -85,7 +85,6 @@ Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const
     const Vector3d up = to_platform.col(1);
 
     Matrix3d r = level_tensor(row.vibration);
-    const double excess = row.vibration.kappa - 1.0;
     if (d.accelerometer_gain != 0) r *= 1.0 - 2.0 * d.accelerometer_gain;
     const Vector3d zero(d.accelerometer_zero_g[0], d.accelerometer_zero_g[1],
                         d.accelerometer_zero_g[2]);
@@ -96,8 +95,10 @@ Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const
     Vector3d across(d.cross_north, 0, d.cross_east);
     const Vector3d seen = cross * up;
     across -= to_platform.transpose() * (seen - up.dot(seen) * up);
-    r.col(1) += excess * across;
-    r.row(1) += excess * across.transpose();
+    // What moves along the vertical moves across it as well.
+    Matrix3d slanted = Matrix3d::Identity();
+    slanted.col(1) += across;
+    r = slanted * r * slanted.transpose();
     const Matrix3d moment = up * up.transpose() + to_platform * r * to_platform.transpose();
 
     const Regressors h = model_.regressors(up, moment);

@@ -1,6 +1,7 @@
 #include "estimator/uncertainty/freed.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/mapped.hpp"
@@ -14,11 +15,52 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kPriorSizes = 16;
+constexpr int kMostSteps = 20;
+constexpr double kSettled = 1e-3;  ///< of a sigma
 
-void append_columns(MatrixXd& to, const MatrixXd& columns) {
-    to.conservativeResize(columns.rows(), to.cols() + columns.cols());
-    to.rightCols(columns.cols()) = columns;
-}
+/// All unknowns of what is freed, with their effect about given coefficients.
+class Unknowns {
+  public:
+    MatrixXd z;  ///< 3 n x m, of the size of each
+    std::vector<FreedUnknown> list;
+    std::vector<double> sizes;
+
+    Unknowns(const Settings& settings, const DwellTable& table, ForwardModel model)
+        : z(3 * table.dwells(), 0), table_(table), model_(std::move(model)) {
+        for (const Misfit misfit : settings.free) {
+            Signatures of = signatures(misfit, table, model_, 1);
+            z.conservativeResize(z.rows(), z.cols() + of.z.cols());
+            z.rightCols(of.z.cols()) = of.z;
+            for (std::size_t i = 0; i < of.elements.size(); ++i) {
+                list.push_back({kStructuralNames[static_cast<std::size_t>(misfit)], of.elements[i],
+                                0, 0, of.unit});
+                sizes.push_back(of.size);
+                sets_.push_back(std::move(of.sets[i]));
+            }
+        }
+    }
+
+    /// What the rates show of them, `unknowns` in sizes: all at once, as large as they are.
+    [[nodiscard]] VectorXd rates(const VectorXd& unknowns) const {
+        VectorXd out = VectorXd::Zero(z.rows());
+        Disturbance together;
+        for (Index k = 0; k < unknowns.size(); ++k) {
+            if (const auto& set = sets_[static_cast<std::size_t>(k)])
+                set(together, unknowns[k]);
+            else
+                out += unknowns[k] * z.col(k);
+        }
+        for (Index k = 0; k < table_.dwells(); ++k)
+            out.segment<3>(3 * k) +=
+                model_.apparent(table_.rows[static_cast<std::size_t>(k)], together);
+        return out;
+    }
+
+  private:
+    const DwellTable& table_;
+    ForwardModel model_;
+    std::vector<std::function<void(Disturbance&, double)>> sets_;
+};
 
 template <std::size_t N>
 void forget(std::array<Declared, N>& inputs) {
@@ -39,38 +81,45 @@ void Freed::put_into(MatrixXd& of_coefficients, MatrixXd& their_covariance) cons
     of_coefficients -= effect * gain;
 }
 
-Freed determine_freed(const Settings& settings, const DwellTable& table, const ForwardModel& model,
-                      const VectorXd& prior_information) {
+Freed determine_freed(const Settings& settings, const DwellTable& table,
+                      const ParameterArray& coefficients, const VectorXd& prior_information) {
     Freed out;
     out.z.resize(3 * table.dwells(), 0);
     out.prior = out.z;
     if (settings.free.empty()) return out;
+    const NullFit fit(table, MatrixXd(3 * table.dwells(), 0), prior_information);
+    const VectorXd measured = all_rates(table);
+    ParameterArray beside = coefficients;
     std::vector<double> sizes;
-    for (const Misfit misfit : settings.free) {
-        const Signatures of = signatures(misfit, table, model, 1);
-        append_columns(out.z, of.z);
-        for (const std::string& element : of.elements) {
-            out.list.push_back(
-                {kStructuralNames[static_cast<std::size_t>(misfit)], element, 0, 0, of.unit});
-            sizes.push_back(of.size);
-        }
+    VectorXd found, sigma, rates = VectorXd::Zero(measured.size());
+    // They multiply the coefficients and one another: once more about what was found, until
+    // nothing moves.
+    for (int step = 0; step < kMostSteps && !out.settled; ++step) {
+        const Unknowns of(settings, table, ForwardModel(settings, beside));
+        out.z = of.z;
+        MatrixXd information = fit.project(of.z).f;
+        information.diagonal().array() += 1 / (kPriorSizes * kPriorSizes);
+        out.covariance = linear_algebra::positive_inverse(information);
+        out.gain = out.covariance * fit.weights(of.z).transpose();
+        if (step == 0) found = VectorXd::Zero(of.z.cols());
+        const VectorXd next = out.gain * (measured - rates + of.z * found);
+        sigma = out.covariance.diagonal().cwiseSqrt();
+        out.settled = ((next - found).array().abs() < kSettled * sigma.array()).all();
+        found = next;
+        rates = of.rates(found);
+        mapped(beside) = mapped(coefficients) - fit.change(rates);
+        out.list = of.list;
+        sizes = of.sizes;
     }
     out.prior = kPriorSizes * out.z;
-    const NullFit fit(table, MatrixXd(3 * table.dwells(), 0), prior_information);
-    MatrixXd information = fit.project(out.z).f;
-    information.diagonal().array() += 1 / (kPriorSizes * kPriorSizes);
-    const Index unknowns = out.z.cols();
-    out.covariance = linear_algebra::positive_inverse(information);
-    out.gain = out.covariance * fit.weights(out.z).transpose();
     out.determined = static_cast<int>(std::lround(
-        static_cast<double>(unknowns) - out.covariance.trace() / (kPriorSizes * kPriorSizes)));
-    const VectorXd found = out.gain * all_rates(table);
-    for (std::size_t i = 0; i < out.list.size(); ++i) {
-        const auto k = static_cast<Index>(i);
-        out.list[i].value = sizes[i] * found[k];
-        out.list[i].sigma = sizes[i] * std::sqrt(out.covariance(k, k));
+        static_cast<double>(found.size()) - out.covariance.trace() / (kPriorSizes * kPriorSizes)));
+    for (Index k = 0; k < found.size(); ++k) {
+        FreedUnknown& one = out.list[static_cast<std::size_t>(k)];
+        const double size = sizes[static_cast<std::size_t>(k)];
+        one.value = size * found[k];
+        one.sigma = size * sigma[k];
     }
-    const VectorXd rates = out.z * found;
     out.rows.assign(table.rows.begin(), table.rows.end());
     for (std::size_t k = 0; k < out.rows.size(); ++k)
         mapped(out.rows[k].rate) -= rates.segment<3>(3 * static_cast<Index>(k));

@@ -39,8 +39,9 @@ class Builder {
     /// One more unknown; `set` gives the disturbance a size in SI units, `in_unit` is one unit.
     Builder& add(std::string element, double in_unit,
                  const std::function<void(Disturbance&, double)>& set) {
-        push(std::move(element),
-             out_.size * in_unit * signature(table_, model_, set, out_.size * in_unit));
+        const double size = out_.size * in_unit;
+        push(std::move(element), size * signature(table_, model_, set, size),
+             [set, size](Disturbance& d, double x) { set(d, size * x); });
         return *this;
     }
     /// A drift of one gyro, deg/h, with the number of the row.
@@ -50,15 +51,17 @@ class Builder {
         for (Index k = 0; k < table_.dwells(); ++k)
             z[3 * k + static_cast<Index>(gyro)] =
                 out_.size * of_row(table_.rows[static_cast<std::size_t>(k)], k);
-        push(std::move(element), std::move(z));
+        push(std::move(element), std::move(z), {});
     }
     Signatures take() { return std::move(out_); }
 
   private:
-    void push(std::string element, VectorXd z) {
+    void push(std::string element, const VectorXd& z,
+              std::function<void(Disturbance&, double)> set) {
         out_.z.conservativeResize(z.size(), out_.z.cols() + 1);
         out_.z.rightCols<1>() = z;
         out_.elements.push_back(std::move(element));
+        out_.sets.push_back(std::move(set));
     }
     const DwellTable& table_;
     const ForwardModel& model_;

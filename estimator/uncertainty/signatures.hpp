@@ -29,6 +29,9 @@ struct Signatures {
     double size = 1;    ///< of the unknowns, in `unit`
     const char* unit = "";
     std::vector<std::string> elements;
+    /// Each unknown, in sizes, as a disturbance of the forward model; empty: a drift, which is
+    /// linear.
+    std::vector<std::function<void(Disturbance&, double)>> sets;
 };
 
 /// By central differences of the forward model, for one unit of an input.

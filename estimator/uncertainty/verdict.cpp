@@ -71,10 +71,10 @@ std::string words_of(const Evidence& e) {
         case Pattern::resolver_1:
         case Pattern::resolver_2:
         case Pattern::resolver_16:
-            return text("resolver harmonics, %s per turn%s, of %.1f +- %.1f arcsec",
-                        e.pattern == Pattern::resolver_1   ? "1"
-                        : e.pattern == Pattern::resolver_2 ? "2"
-                                                           : "16",
+            return text("resolver harmonics, %d per turn%s, of %.1f +- %.1f arcsec",
+                        e.pattern == Pattern::resolver_16  ? 16
+                        : e.pattern == Pattern::resolver_2 ? 2
+                                                           : 1,
                         element.c_str(), size, sigma);
         default:
             return text("a cubic term %s of %.2g +- %.1g deg/h/g^3", e.elements[i].c_str(),
@@ -176,26 +176,30 @@ double asked_of(const Assessment& a, Stage stage) {
     return Evidence::kNamedFrom + std::log(static_cast<double>(looks));
 }
 
+bool near_best(const Evidence& e, const std::vector<Evidence>& of) {
+    return e.named() && e.log_odds >= of.front().log_odds - kNearBest;
+}
+
 void add_patterns(const Settings& settings, const Assessment& a, Stage stage,
                   std::vector<Reason>& list) {
     std::vector<const Evidence*> structural;
     for (const Evidence& e : a.evidence) {
-        if (!e.named() || e.log_odds < a.evidence.front().log_odds - kNearBest) continue;
+        if (!near_best(e, a.evidence)) continue;
         if (is_structural(e.pattern)) {
             structural.push_back(&e);
             continue;
         }
-        Reason reason;
-        reason.code = name_of(e.pattern);
-        reason.text = words_of_state(a, e);
+        Reason reason{name_of(e.pattern), words_of_state(a, e)};
         reason.dwell = e.after_dwell;
         take_size(e, reason);
         list.push_back(std::move(reason));
     }
+    const bool beside = structural.empty();
+    for (const Evidence& e : a.beside_drift)
+        if (beside && near_best(e, a.beside_drift)) structural.push_back(&e);
     if (structural.empty()) return;
-    Reason reason;
-    reason.code = name_of(structural.front()->pattern);
-    reason.text = "the data fit ";
+    Reason reason{name_of(structural.front()->pattern),
+                  beside ? "beside a drift the data fit " : "the data fit "};
     Effect worst;
     for (std::size_t i = 0; i < structural.size(); ++i) {
         reason.text += (i > 0 ? ", or " : "") + words_of(*structural[i]);
@@ -309,10 +313,7 @@ std::string smallest_seen(const Assessment& a) {
     for (const Evidence& e : a.evidence) {
         if (e.pattern != Pattern::azimuth && e.pattern != Pattern::cross_axis) continue;
         // What is determined beside the coefficients is no misfit that could hide.
-        if (std::ranges::any_of(a.freed, [&e](const FreedUnknown& one) {
-                return one.of_class == name_of(e.pattern);
-            }))
-            continue;
+        if (std::ranges::count(a.freed, name_of(e.pattern), &FreedUnknown::of_class) > 0) continue;
         out += out.empty() ? ", smallest misfit seen with 90 %: " : ", ";
         out += e.pattern == Pattern::azimuth
                    ? text("azimuth %.1f arcmin", e.smallest_seen)
@@ -338,15 +339,16 @@ std::optional<Reason> motion_in_step(const Settings& settings, const Assessment&
         largest = std::max(largest, a.sync_bound / std::sqrt(3.0) / a.coefficients[i].u);
     }
     if (!(largest > 0.3)) return {};
-    Reason reason{"sync motion",
+    return Reason{"sync motion",
                   text("the angles move by %.1f arcsec in step with the vibration: up to %.1e "
                        "deg/h/g^2 by coning, if it is the platform that moves",
                        a.sync_arcsec, a.sync_bound),
-                  largest > 2 ? Level::not_valid : Level::doubtful};
-    reason.size = a.sync_arcsec;
-    reason.unit = "arcsec";
-    reason.largest_effect_u = largest;
-    return reason;
+                  largest > 2 ? Level::not_valid : Level::doubtful,
+                  a.sync_arcsec,
+                  kNone,
+                  "arcsec",
+                  0,
+                  largest};
 }
 
 void conclude(const Assessment& a, Verdict& verdict) {
@@ -368,6 +370,11 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
         if (auto reason = motion_in_step(settings, a)) list.push_back(std::move(*reason));
         if (auto reason = accelerometers_apart(settings, result.rows, a))
             list.push_back(std::move(*reason));
+        if (!a.freed_settled)
+            list.push_back({"freed",
+                            "what estimator.free names is too far off to be determined: measure "
+                            "it, and state it in the configuration",
+                            Level::not_valid});
         add_patterns(settings, a, stage, list);
         add_chi_square(a, list);
         add_order(settings, a, list);
