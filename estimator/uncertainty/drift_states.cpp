@@ -286,6 +286,15 @@ DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
     return step;
 }
 
+double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
+    const Kernels kernels(gyro);
+    const double unit = kernels.s0 * kernels.s0;
+    const MatrixXd declared = gyro.declared.rows() > 0 ? gyro.declared : MatrixXd(gyro.dwells(), 0);
+    return Fit(gyro, drifting(gyro.variance.array() + unit * scatter * scatter, kernels.elapsed,
+                              unit * walk * walk, declared))
+        .log_likelihood;
+}
+
 }  // namespace
 
 double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseInverse().mean()); }
@@ -373,19 +382,6 @@ DriftColumns drift_columns(const GyroRates& gyro, const DriftAverage& average) {
     for (std::size_t c = 0; c < list.size(); ++c) out.columns.col(static_cast<Index>(c)) = list[c];
     return out;
 }
-
-namespace {
-
-double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
-    const Kernels kernels(gyro);
-    const double unit = kernels.s0 * kernels.s0;
-    const MatrixXd declared = gyro.declared.rows() > 0 ? gyro.declared : MatrixXd(gyro.dwells(), 0);
-    return Fit(gyro, drifting(gyro.variance.array() + unit * scatter * scatter, kernels.elapsed,
-                              unit * walk * walk, declared))
-        .log_likelihood;
-}
-
-}  // namespace
 
 DriftLikelihood::DriftLikelihood(const GyroRates& gyro)
     : gyro_(gyro), none_(log_likelihood(gyro, 0, 0)) {}
