@@ -91,6 +91,24 @@ std::pair<std::string, std::string> AnyStream::peer_subject() const {
     return {entry(NID_commonName), entry(NID_organizationalUnitName)};
 }
 
+bool AnyStream::peer_is_good_for(asio::ssl::context& now) const {
+    SSL* const ssl = impl_->tls->native_handle();
+    const std::unique_ptr<X509, void (*)(X509*)> certificate(SSL_get1_peer_certificate(ssl),
+                                                             X509_free);
+    const std::unique_ptr<X509_STORE_CTX, void (*)(X509_STORE_CTX*)> at(X509_STORE_CTX_new(),
+                                                                        X509_STORE_CTX_free);
+    if (!certificate || !at ||
+        X509_STORE_CTX_init(at.get(), SSL_CTX_get_cert_store(now.native_handle()),
+                            certificate.get(), SSL_get_peer_cert_chain(ssl)) != 1 ||
+        X509_STORE_CTX_set_default(at.get(), "ssl_client") != 1)
+        return false;
+    X509_STORE_CTX_set_verify_cb(at.get(), [](int good, X509_STORE_CTX* found) {
+        asio::ssl::verify_context context(found);
+        return good == 1 || only_expired(context) ? 1 : 0;
+    });
+    return X509_verify_cert(at.get()) == 1;
+}
+
 std::int64_t AnyStream::peer_expiry() const {
     if (!impl_->tls) return 0;
     SSL* const ssl = impl_->tls->native_handle();

@@ -27,6 +27,7 @@ class AnyStream {
     using Done = std::function<void(boost::system::error_code, std::size_t)>;
 
     explicit AnyStream(Socket socket);
+    /// `tls` has to live as long as the handshake.
     AnyStream(Socket socket, boost::asio::ssl::context& tls);
     AnyStream(AnyStream&&) noexcept;
     AnyStream& operator=(AnyStream&&) noexcept;
@@ -64,6 +65,9 @@ class AnyStream {
     [[nodiscard]] bool encrypted() const noexcept;
     /// Subject of the other side's certificate: common name, organisational unit; empty without.
     [[nodiscard]] std::pair<std::string, std::string> peer_subject() const;
+
+    /// Whether a client's certificate that was good would be so by this context, expired or not.
+    [[nodiscard]] bool peer_is_good_for(boost::asio::ssl::context& now) const;
 
     /// When the other side's certificate ends, or the first of its authorities, s UTC; 0 without.
     [[nodiscard]] std::int64_t peer_expiry() const;

@@ -70,17 +70,27 @@ std::string_view repeated(const Request& request) {
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
+using Tls = std::shared_ptr<asio::ssl::context>;
+
+/// By the certificates and lists of now, too: who is, is not sent away in the middle of a stop.
+bool still_admitted(const AnyStream& stream, const Shared& shared, Tls& admitted) {
+    if (!stream.encrypted() || admitted == shared.tls) return true;
+    if (!stream.peer_is_good_for(*shared.tls)) return false;
+    admitted = shared.tls;
+    return true;
+}
+
 /// One WebSocket client of the stream. Server thread only; lives while a handler of it waits.
 class Stream : public std::enable_shared_from_this<Stream> {
   public:
-    /// `admitted`: Shared::certificates when the client's was looked at.
-    Stream(AnyStream stream, StreamClient client, Shared& shared, Place place,
-           std::uint64_t admitted, std::shared_ptr<const CertificateStatus> certificate)
+    /// `admitted`: Shared::tls when the client's was looked at.
+    Stream(AnyStream stream, StreamClient client, Shared& shared, Place place, Tls admitted,
+           std::shared_ptr<const CertificateStatus> certificate)
         : socket_(std::move(stream)),
           client_(std::move(client)),
           shared_(shared),
           place_(std::move(place)),
-          admitted_(admitted),
+          admitted_(std::move(admitted)),
           certificate_(std::move(certificate)),
           timer_(socket_.get_executor()) {
         ++shared_.api.traffic.streams;
@@ -124,8 +134,8 @@ class Stream : public std::enable_shared_from_this<Stream> {
     /// Writes what is next, or waits until there is something. One of both is always under way.
     void go_on() {
         if (ended_) return;
-        if (socket_.next_layer().encrypted() && admitted_ != shared_.certificates)
-            return close(websocket::close_code::try_again_later, "certificates have changed");
+        if (!still_admitted(socket_.next_layer(), shared_, admitted_))
+            return close(websocket::close_code::policy_error, "the certificate no longer counts");
         if (certificate_ && left_of(certificate_->expires) <= std::chrono::seconds(0))
             return close(websocket::close_code::policy_error, "the certificate has expired");
         try {
@@ -170,7 +180,7 @@ class Stream : public std::enable_shared_from_this<Stream> {
     StreamClient client_;
     Shared& shared_;
     const Place place_;
-    const std::uint64_t admitted_;
+    Tls admitted_;  ///< lives as long as its handshake
     const std::shared_ptr<const CertificateStatus> certificate_;  ///< null: none
     asio::steady_timer timer_;
     beast::flat_buffer buffer_;
@@ -187,7 +197,7 @@ class Session : public std::enable_shared_from_this<Session> {
           caller_(std::move(caller)),
           shared_(shared),
           places_(places),
-          admitted_(shared.certificates),
+          admitted_(shared.tls),
           deadline_(stream_.get_executor()),
           buffer_(shared.limits.header_bytes + shared.limits.body_bytes + 4096),
           requests_(shared.limits.requests_per_s, shared.limits.requests_per_s) {
@@ -326,7 +336,7 @@ class Session : public std::enable_shared_from_this<Session> {
             return refuse(400, "not a request in HTTP/1.1: " + error.message());
         }
         if (error) return end();  // gone, or out of time
-        if (caller_.encrypted && admitted_ != shared_.certificates) return finish();
+        if (!still_admitted(stream_, shared_, admitted_)) return finish();
         if (certificate_ && !caller_.expired &&
             left_of(certificate_->expires) <= std::chrono::seconds(0))
             return finish();  // he may come again, with a stop
@@ -414,7 +424,7 @@ class Session : public std::enable_shared_from_this<Session> {
     Shared& shared_;
     Places& places_;
     Place place_;
-    const std::uint64_t admitted_;
+    Tls admitted_;                                          ///< lives as long as its handshake
     std::shared_ptr<const CertificateStatus> certificate_;  ///< null: none
     asio::steady_timer deadline_;
     beast::flat_buffer buffer_;

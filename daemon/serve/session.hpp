@@ -42,9 +42,9 @@ struct Shared {
     TokenBucket crowd{1. / 60, 1};
     /// Who has not shown a certificate, the oldest first: these take no places from those who have.
     std::list<AnyStream*> newcomers = {};
-    /// Grows when certificates or the list of revoked ones change: who came in with TLS before has
-    /// to show his certificate again.
-    std::uint64_t certificates = 0;
+    /// Another one when certificates or the list of revoked ones have changed: of who came in with
+    /// TLS before the certificate is looked at again. Empty without TLS.
+    std::shared_ptr<boost::asio::ssl::context> tls = {};
     /// Who is connected with a certificate, while he is.
     std::vector<std::weak_ptr<const CertificateStatus>> clients = {};
 };

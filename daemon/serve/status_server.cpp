@@ -119,7 +119,7 @@ struct StatusServer::Impl {
             page = open_tcp(Door::page, listen_tcp("server.page", settings.page, true));
         if (!settings.remote.empty()) {
             certificates_seen = stamp_of(settings);
-            tls.emplace(read_certificates());
+            shared.tls = std::make_shared<asio::ssl::context>(read_certificates());
             read_ends();
             check_certificates();
             remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
@@ -326,9 +326,9 @@ struct StatusServer::Impl {
             if (auto stamp = stamp_of(settings); stamp != certificates_seen) {
                 certificates_seen = std::move(stamp);
                 try {
-                    tls.emplace(read_certificates());
+                    auto renewed = std::make_shared<asio::ssl::context>(read_certificates());
                     read_ends();
-                    ++shared.certificates;
+                    shared.tls = std::move(renewed);
                 } catch (const ServeError& wrong) {
                     source.refused("server", "changed certificates", wrong.what());
                 }
@@ -393,8 +393,8 @@ struct StatusServer::Impl {
             const int on = 1;
             ::setsockopt(socket.native_handle(), IPPROTO_TCP, 1 /* TCP_NODELAY */, &on, sizeof on);
         }
-        AnyStream stream =
-            caller.encrypted ? AnyStream(std::move(socket), *tls) : AnyStream(std::move(socket));
+        AnyStream stream = caller.encrypted ? AnyStream(std::move(socket), *shared.tls)
+                                            : AnyStream(std::move(socket));
         serve_connection(std::move(stream), std::move(caller), shared,
                          places[static_cast<std::size_t>(door)]);
     }
@@ -415,7 +415,6 @@ struct StatusServer::Impl {
                                   {"the status socket", settings.limits.connections},
                                   {"the page", settings.limits.connections},
                                   {"server.remote", settings.limits.connections}}};
-    std::optional<asio::ssl::context> tls;
     std::string page, remote;
     asio::io_context io{1};
     asio::steady_timer life{io};
