@@ -25,6 +25,7 @@ struct Freed {
 };
 using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 using Certificate = std::unique_ptr<X509, Freed<X509_free>>;
+using Time = std::unique_ptr<ASN1_TIME, Freed<ASN1_TIME_free>>;
 using List = std::unique_ptr<X509_CRL, Freed<X509_CRL_free>>;
 using Bio = std::unique_ptr<BIO, Freed<BIO_free_all>>;
 
@@ -169,31 +170,41 @@ Identity make_identity(const CertificateSettings& settings, const Identity* issu
     return {text_of(pem.get()), text_of(secret.get())};
 }
 
+namespace {
+
+void add_revoked(X509_CRL* list, const std::string& certificate, X509* issuer, ASN1_TIME* now) {
+    const Certificate gone = certificate_of(certificate);
+    if (X509_verify(gone.get(), X509_get0_pubkey(issuer)) != 1)
+        throw PkiError("the certificate is not this authority's");
+    X509_REVOKED* entry = nullptr;
+    if (X509_CRL_get0_by_cert(list, &entry, gone.get()) == 1)
+        throw PkiError("the certificate is revoked already");
+    std::unique_ptr<X509_REVOKED, Freed<X509_REVOKED_free>> added(X509_REVOKED_new());
+    must(added &&
+             X509_REVOKED_set_serialNumber(added.get(), X509_get_serialNumber(gone.get())) == 1 &&
+             X509_REVOKED_set_revocationDate(added.get(), now) == 1 &&
+             X509_CRL_add0_revoked(list, added.get()) == 1,
+         "the list of revoked certificates");
+    static_cast<void>(added.release());
+}
+
+}  // namespace
+
 std::string revoke(const std::string& certificate, const Identity& authority,
                    const std::string& before) {
-    const Certificate gone = certificate_of(certificate);
     const Certificate issuer = certificate_of(authority.certificate);
     const Key key = key_of(authority.key);
-    if (X509_verify(gone.get(), X509_get0_pubkey(issuer.get())) != 1)
-        throw PkiError("the certificate is not this authority's");
     const List list(before.empty()
                         ? X509_CRL_new()
                         : PEM_read_bio_X509_CRL(reader(before).get(), nullptr, nullptr, nullptr));
     must(list != nullptr, "reading the list of revoked certificates");
-    X509_REVOKED* entry = nullptr;
-    if (X509_CRL_get0_by_cert(list.get(), &entry, gone.get()) == 1)
-        throw PkiError("the certificate is revoked already");
-    std::unique_ptr<X509_REVOKED, Freed<X509_REVOKED_free>> added(X509_REVOKED_new());
-    const std::unique_ptr<ASN1_TIME, Freed<ASN1_TIME_free>> now(X509_gmtime_adj(nullptr, 0));
-    must(added && now && X509_CRL_set_version(list.get(), X509_CRL_VERSION_2) == 1 &&
+    const Time now(X509_gmtime_adj(nullptr, 0));
+    must(now && X509_CRL_set_version(list.get(), X509_CRL_VERSION_2) == 1 &&
              X509_CRL_set_issuer_name(list.get(), X509_get_subject_name(issuer.get())) == 1 &&
              X509_CRL_set1_lastUpdate(list.get(), now.get()) == 1 &&
-             X509_CRL_set1_nextUpdate(list.get(), X509_get0_notAfter(issuer.get())) == 1 &&
-             X509_REVOKED_set_serialNumber(added.get(), X509_get_serialNumber(gone.get())) == 1 &&
-             X509_REVOKED_set_revocationDate(added.get(), now.get()) == 1 &&
-             X509_CRL_add0_revoked(list.get(), added.get()) == 1,
+             X509_CRL_set1_nextUpdate(list.get(), X509_get0_notAfter(issuer.get())) == 1,
          "the list of revoked certificates");
-    static_cast<void>(added.release());
+    if (!certificate.empty()) add_revoked(list.get(), certificate, issuer.get(), now.get());
     must(X509_CRL_sort(list.get()) == 1 && X509_CRL_sign(list.get(), key.get(), EVP_sha256()) > 0,
          "signing the list of revoked certificates");
     const Bio pem(BIO_new(BIO_s_mem()));

@@ -37,8 +37,8 @@ struct Identity {
 [[nodiscard]] Identity make_identity(const CertificateSettings& settings,
                                      const Identity* issuer = nullptr);
 /// The authority's list of certificates that no longer count (CRL, PEM), valid as long as the
-/// authority: `before` (empty: none yet) and one certificate more. Throws PkiError, also when the
-/// certificate is another authority's.
+/// authority: `before` (empty: none yet) and one certificate more; of an empty one nobody's. Throws
+/// PkiError, also when the certificate is another authority's.
 [[nodiscard]] std::string revoke(const std::string& certificate, const Identity& authority,
                                  const std::string& before);
 /// Key, certificate and authority in one file that browsers import. Throws PkiError.

@@ -201,6 +201,10 @@ int init(const PkiOptions& options) {
             "authority: " + (folder / kAuthority).string() + ".crt; keep its key off the rig");
         all["authority_is_new"] = true;
     }
+    // Named in the configuration from the first day, it is there when somebody has to be shut out.
+    if (!fs::exists(folder / kRevoked))
+        write(folder / kRevoked, serve::revoke("", authority, ""), false);
+    all["list"] = (folder / kRevoked).string();
     all["server"] = nullptr;
     all["people"] = Json::array();
     const auto client = [&](const std::string& name, const std::string& role) {

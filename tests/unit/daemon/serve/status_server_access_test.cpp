@@ -192,7 +192,7 @@ TEST_F(Access, RevokedCertificatesAreRefusedAtOnce) {
         std::filesystem::rename(folder.file("new"), folder.file("revoked.crl"));
     };
     const Identity gone = person("admin"), ada = person("operator"), eve = person("operator");
-    const std::string first = revoke(gone.certificate, authority, "");
+    const std::string first = revoke(gone.certificate, authority, revoke("", authority, ""));
     list(first);
     settings.revoked = folder.file("revoked.crl");
     server.emplace(source, settings);
@@ -293,8 +293,8 @@ TEST_F(Access, AStopGetsThroughWhileCertificatesChange) {
         std::ofstream(folder.file("new")) << text;
         std::filesystem::rename(folder.file("new"), folder.file("revoked.crl"));
     };
-    const Identity first = person("admin"), ada = person("operator"), eve = person("operator");
-    std::string revoked = revoke(first.certificate, authority, "");
+    const Identity ada = person("operator"), eve = person("operator");
+    std::string revoked = revoke("", authority, "");  // nobody's
     list(revoked);
     settings.revoked = folder.file("revoked.crl");
     server.emplace(source, settings);

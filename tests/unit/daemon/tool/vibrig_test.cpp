@@ -153,6 +153,8 @@ TEST_F(VibrigOptions, PkiSaysToMachinesWhatItMade) {
     ASSERT_EQ(vibrig("pki init --json --folder p --host a.lab --viewer wall --operator ada"), 0);
     const auto made = nlohmann::json::parse(out);
     EXPECT_EQ(made["authority_is_new"], true);
+    EXPECT_EQ(made["list"], "p/revoked.crl");
+    EXPECT_FALSE(content("p/revoked.crl").empty());
     EXPECT_EQ(made["server"]["hosts"], nlohmann::json{"a.lab"});
     ASSERT_EQ(made["people"].size(), 2);
     EXPECT_EQ(made["people"][1]["name"], "ada");
