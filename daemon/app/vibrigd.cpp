@@ -195,7 +195,9 @@ struct Print {
     bool asked = false;
 };
 
-std::array<Print, 6> prints() {
+using Prints = std::array<Print, 6>;
+
+Prints prints() {
     return {{{"--schema", "print every key with type, unit, default and bounds, and end",
               vibrig::configuration::format_schema},
              {"--json-schema", "print the JSON Schema of the configuration file, for editors",
@@ -224,6 +226,18 @@ void print_check(const vibrig::configuration::Loaded& loaded) {
     for (const std::string& line : vibrig::check_plan(loaded.configuration))
         std::cerr << "warning: campaign: " << line << '\n';
     insist(forecast);
+}
+
+/// Each is an answer of its own. Throws.
+void insist_on_one(const Prints& prints, bool check) {
+    std::string asked = check ? "--check" : "";
+    for (const Print& print : prints) {
+        if (!print.asked) continue;
+        if (!asked.empty())
+            throw std::runtime_error("found " + asked + " with " + print.flag +
+                                     ", expected one of them");
+        asked = print.flag;
+    }
 }
 
 constexpr std::initializer_list<vibrig::proto::Exit> kExits{
@@ -273,6 +287,7 @@ int main(int argc, char** argv) {
 
     try {
         vibrig::estimator::use_instruction_set(instruction_set);
+        insist_on_one(printable, check);
         for (const Print& print : printable) {
             if (!print.asked) continue;
             std::cout << print.words();

@@ -293,6 +293,13 @@ TEST_F(VibrigOptions, EachProgramSaysWhenNobodyCanReadWhatItPrints) {
     }
 }
 
+TEST_F(VibrigOptions, OfTwoThingsToPrintNoneIsPrinted) {
+    EXPECT_EQ(run(VIBRIGD, "--init --check"), 2);
+    EXPECT_EQ(error, "vibrigd: found --check with --init, expected one of them\n");
+    EXPECT_EQ(run(VIBRIGD, "--print-dbc --print-proto"), 2);
+    EXPECT_EQ(out, "");
+}
+
 TEST_F(VibrigOptions, JsonHasATextThatIsNoUtf8) {
     // GIVEN a folder whose name is Latin-1
     ASSERT_EQ(vibrig("pki init --json --folder 'caf\351'"), 0) << error;
