@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <cmath>
 #include <utility>
 
 namespace vibrig {
@@ -123,8 +124,9 @@ void Supervisor::tell_alarms(const std::string& guard_lacks) {
             log(Severity::alarm, "interlock", row.rule->name + ": vibrig-guard " + guard_lacks);
         } else if (condition.has_limit()) {
             log(Severity::alarm, "interlock",
-                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
-                            row.value, row.rule->limit, condition.unit));
+                fmt::format("{}: {}: {}, limit {:.4g} {}", row.rule->name, condition.text,
+                            std::isnan(row.value) ? "not known" : fmt::format("{:.4g}", row.value),
+                            row.rule->limit, condition.unit));
         } else {
             log(Severity::alarm, "interlock",
                 fmt::format("{}: {}", row.rule->name, condition.text));

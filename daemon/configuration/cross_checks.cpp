@@ -103,6 +103,12 @@ void CrossCheck::for_daemon() {
                    " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
                "a window shorter than the timeout");
     }
+    if (sound({"campaign.temperature_window_s", "can.signals.temperature"}) &&
+        c_.campaign.temperature_window_s > 0 && c_.assembler.bindings.temperature.empty()) {
+        refuse({"campaign.temperature_window_s"},
+               plain(c_.campaign.temperature_window_s) + " with no can.signals.temperature",
+               "0 where no temperature is known");
+    }
     doors();
     broker();
     onlookers();

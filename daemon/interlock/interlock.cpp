@@ -166,7 +166,10 @@ void Interlock::check(const drivers::Sample& sample,
             judge(By::sample, Trip::filter_divergence, nis, now);
     }
     if (platform.temperature_time > 0)
-        judge(By::sample, Trip::temperature, platform.temperature_c, now);
+        judge(By::sample, Trip::temperature,
+              platform.knows_temperature(now) ? platform.temperature_c
+                                              : std::numeric_limits<double>::quiet_NaN(),
+              now);
     if (const double free_mb = disk_free_mb_.load(); free_mb >= 0)
         judge(By::sample, Trip::disk, free_mb, now);
     judge(By::sample, Trip::recording, recording_degraded_.load(), now);
@@ -409,8 +412,13 @@ std::string Interlock::text_of(const Tripped& tripped) const {
     if (!condition.has_limit() || tripped.row >= rules_.size() ||
         rules_[tripped.row].condition != tripped.cause)
         return condition.text;
-    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", value,
-                  rules_[tripped.row].limit, condition.unit);
+    const double limit = rules_[tripped.row].limit;
+    if (std::isnan(value))
+        std::snprintf(words.data(), words.size(), ": not known, limit %.4g %s", limit,
+                      condition.unit);
+    else
+        std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", value, limit,
+                      condition.unit);
     return std::string(condition.text) + words.data();
 }
 

@@ -101,7 +101,12 @@ struct PlatformStatus {
     /// At any time since the sample before, whatever was said after it.
     bool loop_was_open = false, had_fault = false;
     Time temperature_time = 0;  ///< of the newest temperature_c; 0: none yet
-    Time gimbal_time = 0;       ///< of the newest gimbal status frame; 0: none yet
+    /// A thermometer that has said nothing for so long says nothing.
+    static constexpr Time kTemperatureDeadline = 60 * kSecond;
+    [[nodiscard]] bool knows_temperature(Time now) const noexcept {
+        return temperature_time > 0 && now - temperature_time <= kTemperatureDeadline;
+    }
+    Time gimbal_time = 0;  ///< of the newest gimbal status frame; 0: none yet
     bool in_position = false;
     bool slewing = false;
     std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted

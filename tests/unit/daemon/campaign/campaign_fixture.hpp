@@ -53,6 +53,7 @@ struct CampaignTest : testing::Test {
     bool disobeyed = false;
     int uncommanded = 0, gimbals_led = 0, gimbals_silent = 0;
     bool gimbal_status = true;      ///< it comes
+    bool temperature_comes = true;
     bool starts_by_itself = false;  ///< the table, in this test
     Proving proving = Proving::nothing;
     std::int64_t utc_ns = 0;
@@ -162,6 +163,7 @@ struct CampaignTest : testing::Test {
     void run_rig() {
         now += 100 * kMillisecond;
         platform.time = now;
+        if (temperature_comes) platform.temperature_time = now;
         if (gimbal_status) platform.gimbal_time = now;
         for (; frames_seen < port.frames.size(); ++frames_seen) {
             const auto& frame = port.frames[frames_seen];

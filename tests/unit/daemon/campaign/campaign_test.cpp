@@ -59,6 +59,23 @@ TEST_F(CampaignTest, WaitsForAReadyPlatformAndASteadyTemperature) {
     EXPECT_TRUE(run_until(CampaignState::slewing, 20));
 }
 
+TEST_F(CampaignTest, ATemperatureThatNoLongerComesIsNotSteady) {
+    // GIVEN a platform whose thermometer has a message of its own, which has ceased
+    run_rig();
+    temperature_comes = false;
+    for (int i = 0; i < 601; ++i) run_rig();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    for (int i = 0; i < 100; ++i) run_rig();
+    EXPECT_EQ(status().state, CampaignState::waiting);
+    EXPECT_EQ(status().reason, "no temperature on the bus");
+    // WHEN it comes again THEN its window is waited for
+    temperature_comes = true;
+    for (int i = 0; i < 40; ++i) run_rig();
+    EXPECT_EQ(status().reason, "temperature not steady");
+    EXPECT_TRUE(run_until(CampaignState::slewing, 20));
+}
+
 TEST_F(CampaignTest, WaitsForTheFirstPlatformStatus) {
     // GIVEN a campaign started before the platform has said anything
     ASSERT_TRUE(command(Kind::arm).accepted);

@@ -285,6 +285,8 @@ TEST(Together, ContradictionsAreRefused) {
     EXPECT_THAT(complaint("can.sample_rate_hz = 8"), HasSubstr("more than one sample period"));
     EXPECT_THAT(complaint("shaker.unit = 250"), HasSubstr("1 to 247, or 255"));
     EXPECT_THAT(complaint("campaign.ready_timeout_s = 30", true), HasSubstr("a window shorter"));
+    EXPECT_THAT(complaint("can.signals.temperature = \"\"", true),
+                HasSubstr("0 where no temperature is known"));
 }
 
 TEST(Together, AMistakeInAValueIsReportedOnce) {

@@ -310,6 +310,22 @@ TEST_F(TableTest, TakesNoAmplitudeForOneThatIsOff) {
     EXPECT_EQ(interlock->tripped(), Trip::amplitude_off);
 }
 
+TEST_F(TableTest, ATemperatureThatNoLongerComesIsNotBelieved) {
+    make({{"hot", Trip::temperature, Reaction::abort, 90, 5, true}});
+    platform.temperature_c = 40;
+    platform.temperature_time = sample.time;
+    const auto seconds = [this] { return drivers::to_seconds(sample.time); };
+    const double last = seconds();
+    while (seconds() < last + 60) {
+        next();
+        EXPECT_EQ(interlock->tripped(), Trip::none) << seconds();
+    }
+    while (seconds() < last + 65.2) next();
+    ASSERT_EQ(interlock->tripped(), Trip::temperature);
+    EXPECT_EQ(interlock->text_of(interlock->latched()),
+              "platform temperature: not known, limit 90 degC");
+}
+
 TEST_F(TableTest, ALatchedAlarmStaysUntilItsNameIsAcknowledged) {
     make({{"hot", Trip::temperature, Reaction::alarm, 70, 0.1, true},
           {"warm", Trip::temperature, Reaction::alarm, 60, 0, false}});
