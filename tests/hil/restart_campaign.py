@@ -81,7 +81,7 @@ def take_up(checks, rig, what, count):
                  status["campaign"]["resume_offer"])
     at_rest(checks, rig, what)
     clear(rig)
-    rig.tool("arm", "--by", "Grace")
+    rig.arm("Grace")
     on = rig.tool("resume", "--by", "Grace")
     checks.check(on.returncode == 0 and f"{known} of {count}" in on.stdout, f"{what}: armed, it resumes on command", on.stdout + on.stderr)
 
@@ -112,8 +112,8 @@ def killed_and_resumed(checks, programs, folder):
             refused = rig.tool("resume", "--by", "Grace")
             checks.check(refused.returncode == 1 and "not armed" in refused.stderr, "it does not resume disarmed",
                          refused.stderr)
-            armed = rig.tool("arm", "--by", "Grace")
-            checks.equal(armed.returncode, 0, "it can be armed")
+            armed = rig.arm("Grace")
+            checks.check(armed.returncode == 0, "it can be armed", armed.stderr)
             time.sleep(0.5)
             checks.check(checks_rest(rig.status()), "arming moves nothing")
             resumed = rig.tool("resume", "--by", "Grace")
@@ -180,7 +180,7 @@ def noise_goes_on(checks, programs, folder):
         done = rig.positions_done()
         restart(checks, rig, "noisy gyros, killed")
         clear(rig)
-        rig.tool("arm", "--by", "Grace")
+        rig.arm("Grace")
         # The rig's time stands still with it: no further dwell is done before the estimates are asked for.
         rig.plant.process.send_signal(signal.SIGSTOP)
         try:
