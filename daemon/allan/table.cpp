@@ -21,10 +21,15 @@ std::string fit_table(const allan::Fit& fit) {
     std::string out;
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         const allan::FittedTerm& term = fit.terms[j];
-        out += term.detected ? printed("  %s  %11.4g +- %-9.2g %s\n", allan::kTermNames[j],
-                                       term.value, term.sigma, allan::kTermUnits[j])
-                             : printed("  %s  not detected, below %.2g %s\n", allan::kTermNames[j],
-                                       term.below, allan::kTermUnits[j]);
+        if (term.detected) {
+            out += printed("  %s  %11.4g +- %-9.2g %s\n", allan::kTermNames[j], term.value,
+                           term.sigma, allan::kTermUnits[j]);
+        } else if (std::isfinite(term.below)) {
+            out += printed("  %s  not detected, below %.2g %s\n", allan::kTermNames[j], term.below,
+                           allan::kTermUnits[j]);
+        } else {
+            out += printed("  %s  not detected, no bound\n", allan::kTermNames[j]);
+        }
     }
     if (const std::string verdict = fit.verdict(); !verdict.empty()) out += "  " + verdict + "\n";
     out += "  terms that explain the curve:";

@@ -52,7 +52,7 @@ NumberTable read_table(const std::string& text, const std::string& path, const T
         const std::size_t end = std::min(rest.find('\n'), rest.size());
         const auto fields = split(rest.substr(0, end));
         rest.remove_prefix(std::min(end + 1, rest.size()));
-        if (fields.size() == 1 && fields[0].empty()) continue;
+        if (fields[0].starts_with('#') || (fields.size() == 1 && fields[0].empty())) continue;
         const std::string place = path + ":" + std::to_string(number);
         if (table.names.empty()) {
             table.names.assign(fields.begin(), fields.end());
@@ -61,6 +61,12 @@ NumberTable read_table(const std::string& text, const std::string& path, const T
                     refuse(place, "column " + proto::printable(name) + " twice", "it once");
             }
             continue;
+        }
+        // Decimal commas, or a header of another file: numbers would be read from beside their
+        // columns.
+        if (fields.size() > table.names.size()) {
+            refuse(place, std::to_string(fields.size()) + " fields",
+                   std::to_string(table.names.size()) + " as in the header");
         }
         std::vector<double> row(table.names.size(), std::nan(""));
         std::vector<std::string> words(table.names.size());

@@ -11,6 +11,7 @@
 #include "daemon/report/paperwork.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/dwell_residual.hpp"
 
@@ -134,7 +135,8 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
         std::array<double, 3> middle{};
         for (std::size_t k = 0; k < 3; ++k)
             middle[k] = blocks[blocks.size() / 2].angle_rad[k] * estimator::kDegPerRad;
-        const Prediction expected = predict(settings, others, middle, vibration);
+        const Prediction expected =
+            predict(settings, others, estimator::gimbal_deg(settings, middle), vibration);
         const double span_s = blocks.back().time_s - blocks.front().time_s + kBlock_s;
         const double in_block =
             static_cast<double>(dwell.count) / static_cast<double>(blocks.size());

@@ -6,6 +6,7 @@
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/filter/second_moment.hpp"
 
@@ -34,9 +35,7 @@ Prediction predict(const estimator::Settings& settings, const Coefficients& of,
                    const estimator::VibrationMoment& vibration) {
     const estimator::Kinematics kinematics(settings);
     const estimator::DriftModel model(settings);
-    std::array<double, 3> raw{};
-    for (std::size_t i = 0; i < 3; ++i) raw[i] = attitude_deg[i] * estimator::kRadPerDeg;
-    const auto pose = kinematics.pose(kinematics.gimbal_angles(raw));
+    const auto pose = kinematics.pose(estimator::mapped(attitude_deg) * estimator::kRadPerDeg);
     const auto h = model.regressors(pose.up, estimator::second_moment(pose, vibration));
     Prediction out;
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {

@@ -29,7 +29,7 @@ struct Prediction {
 };
 
 /// Drift h . D of eqs 8-9 of Tang et al. 2009 with k1 = 1, k2 = kappa, and sqrt(h' P h) of the
-/// coefficients' covariance; encoder angles in deg, kappa = 1 + a^2 / 2 with a in g at the
+/// coefficients' covariance; gimbal angles in deg, kappa = 1 + a^2 / 2 with a in g at the
 /// platform.
 [[nodiscard]] Prediction predict(const estimator::Settings& settings, const Coefficients& of,
                                  const std::array<double, 3>& attitude_deg,

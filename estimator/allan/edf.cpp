@@ -68,7 +68,10 @@ double difference_edf(Alpha alpha, std::size_t points, std::size_t m, int order,
         return 1.0;
     }
     const std::size_t stride = overlapping ? std::min(m, kLagResolution) : 1;
-    const double f = modified ? 1.0 : real(std::min(m, kLagResolution));
+    // The phase is read, not averaged, and from white FM on it needs no bandwidth: then it is
+    // exact.
+    const bool as_read = alpha <= 0 && (!modified || m == 1);
+    const double f = as_read ? 0.0 : modified ? 1.0 : real(std::min(m, kLagResolution));
     const double terms = 1 + std::floor(real(stride) * (real(points) - span) / factor);
     const double lags = std::min(terms, real(stride) * (order + 1));
     const double zero = std::pow(s_z(0, f, alpha, order), 2);

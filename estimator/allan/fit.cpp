@@ -20,7 +20,6 @@ constexpr double kStretch = 1.5;
 constexpr double kFineEnough = 0.01;
 constexpr int kMostSections = 12;
 constexpr double kWidest = 2;
-constexpr std::size_t kFollowed = 2;
 constexpr double kGuess = 0.01;
 
 std::size_t at(Term term) { return static_cast<std::size_t>(term); }
@@ -59,33 +58,54 @@ double least(const std::vector<TermFit>& fits, const Where& where) {
     return deviance;
 }
 
-/// Where the least deviance over the other terms of `from` has risen to the bound: ln(square) of
-/// term j, from `start` on.
+/// Of -2 ln(likelihood), up to the bound.
+double rise_of_bound(std::size_t term) { return deviance_at(is_slow(term) ? kBoundSlow : kBound); }
+
+/// How far term j of this square is beyond the bound, by the least deviance over the other terms.
+double excess_of(const TermFit& from, std::size_t j, double square,
+                 const CurveLikelihood& likelihood) {
+    return likelihood.profile(from, j, square) - from.deviance - rise_of_bound(j);
+}
+
+/// Square of term j, from ln `start` on, where the least deviance over the other terms of `from`
+/// has risen to the bound; infinite where it does not within anything that the curve has room for.
 double bound_from(const TermFit& from, std::size_t j, double start,
                   const CurveLikelihood& likelihood) {
-    const auto excess = [&](double x) {
-        return likelihood.profile(from, j, std::exp(x)) - from.deviance -
-               deviance_at(is_slow(j) ? kBoundSlow : kBound);
-    };
-    const double least = std::log(1e-12 * likelihood.largest_square(j));
-    const double most = std::log(1e3 * likelihood.largest_square(j));
-    double low = std::clamp(start, least, most);
-    double at_low = excess(low);
-    double high = low;
-    double at_high = at_low;
+    const auto excess = [&](double x) { return excess_of(from, j, std::exp(x), likelihood); };
+    // The last point, of one difference, may be next to nothing by chance: so large that the term
+    // alone is above all of the curve.
+    double whole = 0;
+    for (const VariancePoint& point : likelihood.curve()) {
+        whole = std::max(whole, point.variance / term_variance(static_cast<Term>(j), point.tau));
+    }
+    const double most = std::log(1e3 * whole);
+    // The fit's own value is not beyond, and is not stepped over: of a term that is well known the
+    // curve forbids what is smaller, too.
+    double low = std::log(from.has[j] ? from.square[j] : 1e-12 * likelihood.largest_square(j));
+    double at_low = -rise_of_bound(j);
+    double high = std::max(start, low);
+    double at_high = excess(high);
     while (at_high < 0 && high < most) {
         low = std::exchange(high, high + kStretch);
         at_low = std::exchange(at_high, excess(high));
     }
-    while (at_low >= 0 && low > least) {
-        high = std::exchange(low, low - kStretch);
-        at_high = std::exchange(at_low, excess(low));
+    if (at_high < 0) return kInfinity;
+    for (double nearer = high - kStretch; nearer > low; nearer -= kStretch) {
+        const double found = excess(nearer);
+        if (found < 0) {
+            low = nearer;
+            at_low = found;
+        } else {
+            high = nearer;
+            at_high = found;
+        }
     }
     // False position; a side that stays counts half (Illinois).
-    for (int i = 0; i < kMostSections && high - low > kFineEnough && at_low < 0; ++i) {
-        const double middle = std::isfinite(at_high)
-                                  ? (low * at_high - high * at_low) / (at_high - at_low)
-                                  : (low + high) / 2;
+    for (int i = 0; i < kMostSections && high - low > kFineEnough; ++i) {
+        const double middle =
+            std::isfinite(at_high)
+                ? std::clamp((low * at_high - high * at_low) / (at_high - at_low), low, high)
+                : (low + high) / 2;
         const double found = excess(middle);
         if (found < 0) {
             low = middle;
@@ -101,8 +121,8 @@ double bound_from(const TermFit& from, std::size_t j, double start,
 }
 
 /// Largest square of the term that a set which is not excluded allows, by its own likelihood. Those
-/// are followed that allow most by their errors, and the best of those in which the term went to
-/// zero.
+/// that allow most by their errors come first; others are followed when they allow more than those
+/// do. Of the sets in which the term went to zero the best one is enough.
 double bound_of(std::size_t j, const std::vector<TermFit>& fits, double excluded,
                 const CurveLikelihood& likelihood) {
     struct Candidate {
@@ -124,12 +144,12 @@ double bound_of(std::size_t j, const std::vector<TermFit>& fits, double excluded
             std::any_of(fits.begin(), fits.end(), [&](const TermFit& f) { return f.has == set; });
         if (!fitted && (zero == nullptr || fit.deviance < zero->deviance)) zero = &fit;
     }
+    if (zero != nullptr) with.push_back({std::log(kGuess * likelihood.largest_square(j)), zero});
     std::sort(with.begin(), with.end(),
               [](const Candidate& a, const Candidate& b) { return a.start > b.start; });
-    if (with.size() > kFollowed) with.erase(with.begin() + kFollowed, with.end());
-    if (zero != nullptr) with.push_back({std::log(kGuess * likelihood.largest_square(j)), zero});
     double square = 0;
     for (const Candidate& candidate : with) {
+        if (square > 0 && excess_of(*candidate.fit, j, square, likelihood) >= 0) continue;
         square = std::max(square, bound_from(*candidate.fit, j, candidate.start, likelihood));
     }
     return square;
@@ -205,14 +225,10 @@ void note_ramp(Fit& fit, double record_h) {
     if (r.detected) r.below = r.value + 2 * r.sigma;
     if (!k.detected) return;
     r.below = std::max(r.below, bound);
-    if (!r.detected || r.value < 2 * bound) {
+    if (!r.detected) {
         fit.ramp_note =
             text("R is known no better than K/sqrt(T) = %.3g deg/h^2 in this record of %.3g h",
                  bound, record_h);
-        if (r.value > 0) {
-            fit.ramp_note += text("; a record of %.3g h would show it at two standard errors",
-                                  4 * walk * walk / (r.value * r.value));
-        }
     }
 }
 

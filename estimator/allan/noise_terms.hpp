@@ -17,7 +17,7 @@ struct FittedTerm {
     bool detected = false;
     double value = 0;  ///< best estimate, detected or not; 0 where its square would be negative
     double sigma = 0;  ///< 1 sigma of the value, meaningful when detected; 0 if the value is
-    double below = 0;  ///< the term is not larger, at two standard errors
+    double below = 0;  ///< the term is not larger, at two standard errors; infinite: no bound
 };
 
 /// Modified Allan deviation of the angle residuals, all kept dwells together.

@@ -176,7 +176,14 @@ Augmentation augment(const std::vector<double>& covariance,
             search.add(all[search.best_of(all)]);
         }
         const auto improve = [&] {
-            for (int pass = 0; pass < kMostPasses && search.exchange(); ++pass) {
+            for (int pass = 0; pass < kMostPasses; ++pass) {
+                const RunSearch before = search;
+                if (!search.exchange()) return;
+                // Less is missing over all, yet perhaps one target that was met.
+                if (before.met() && !search.met()) {
+                    search = before;
+                    return;
+                }
             }
         };
         improve();

@@ -82,25 +82,39 @@ PureError pure_error(const std::vector<Reading>& readings) {
     for (const Reading& r : readings) at_input[r.input].push_back(r.output);
     PureError out;
     for (const auto& [input, outputs] : at_input) {
-        double mean = 0;
-        for (const double y : outputs) mean += y / static_cast<double>(outputs.size());
+        // From the first on: the mean of equal outputs is theirs, without rounding.
+        double mean = outputs.front();
+        for (const double y : outputs)
+            mean += (y - outputs.front()) / static_cast<double>(outputs.size());
         for (const double y : outputs) out.squares += (y - mean) * (y - mean);
         out.degrees += outputs.size() - 1;
     }
     return out;
 }
 
-std::optional<ResidualTest> test_of(const std::vector<Reading>& readings, double squares,
-                                    std::size_t degrees) {
-    if (degrees == 0) return {};
-    const auto d = static_cast<double>(degrees);
-    if (stated(readings)) return ResidualTest{squares, chi_square_tail(squares, d), d, 0};
+/// The test of `out`, or why there is none.
+void test_residuals(const std::vector<Reading>& readings, double squares, SensorCalibration& out) {
+    const auto d = static_cast<double>(out.degrees);
     const PureError error = pure_error(readings);
-    if (error.degrees == 0 || error.degrees >= degrees || !(error.squares > 0)) return {};
-    const auto e = static_cast<double>(error.degrees);
-    const double lack = d - e;
-    const double ratio = std::max(0.0, squares - error.squares) / lack / (error.squares / e);
-    return ResidualTest{ratio, f_tail(ratio, lack, e), lack, e};
+    if (out.degrees == 0) {
+        out.untested = "as many readings as coefficients";
+    } else if (stated(readings)) {
+        out.test = ResidualTest{squares, chi_square_tail(squares, d), d, 0};
+    } else if (error.degrees == 0) {
+        out.untested = "neither the noise is stated (--sigma) nor is an input repeated";
+    } else if (error.degrees >= out.degrees) {
+        out.untested = "as many different inputs as coefficients";
+    } else if (!(error.squares > 0)) {
+        out.untested = text(
+            "repeated readings agree exactly, the model leaves %.3g: either they have less noise "
+            "than one step of the output, or the model does not hold (state --sigma)",
+            std::sqrt(squares / d));
+    } else {
+        const auto e = static_cast<double>(error.degrees);
+        const double lack = d - e;
+        const double ratio = std::max(0.0, squares - error.squares) / lack / (error.squares / e);
+        out.test = ResidualTest{ratio, f_tail(ratio, lack, e), lack, e};
+    }
 }
 
 }  // namespace
@@ -132,7 +146,7 @@ SensorCalibration calibrate(const std::vector<Reading>& readings, const Terms& t
     const double unit = stated(readings)  ? 1
                         : out.degrees > 0 ? std::sqrt(squares / static_cast<double>(out.degrees))
                                           : kNaN;
-    out.test = test_of(readings, squares, out.degrees);
+    test_residuals(readings, squares, out);
     const Vector leverage = linear_algebra::product(a, spread).cwiseProduct(a).rowwise().sum();
     for (std::size_t i = 0; i < readings.size(); ++i) {
         const double sigma = stated(readings) ? readings[i].sigma : 1;

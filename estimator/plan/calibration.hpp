@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimator/plan/evaluation.hpp"
@@ -40,13 +41,15 @@ struct SensorCalibration {
     std::vector<double> residual;      ///< output less model, one a reading
     std::vector<double> standardised;  ///< over its own 1 sigma; NaN where the model must fit
     std::optional<ResidualTest> test;  ///< nothing when neither sigma nor repeated readings tell
+    std::string untested;              ///< why there is none; empty: there is
 };
 
 /// Weighted by 1 / sigma^2. With stated sigmas the sum of squared residuals over sigma^2 follows
 /// chi-square(degrees); without, readings repeated at one input tell the noise apart from lack of
-/// fit: F of the two. Throws PlanError for fewer readings than coefficients, an input, output or
-/// sigma beyond the limits above, sigmas of which some but not all are 0, and inputs that excite no
-/// term.
+/// fit: F of the two. Repeated readings that agree exactly tell of no noise: those of a coarse
+/// converter do, whose steps are in the residuals. Throws PlanError for fewer readings than
+/// coefficients, an input, output or sigma beyond the limits above, sigmas of which some but not
+/// all are 0, and inputs that excite no term.
 [[nodiscard]] SensorCalibration calibrate(const std::vector<Reading>& readings,
                                           const Terms& terms = kAllTerms);
 

@@ -130,7 +130,7 @@ struct Calibration::Impl {
         has_azimuth = std::isfinite(in.azimuth_rad);
         const double azimuth =
             has_azimuth ? in.azimuth_rad : settings.plan.targets_deg.front() * kRadPerDeg;
-        filter.emplace(settings, azimuth);
+        filter.emplace(settings, azimuth + settings.heading_deg * kRadPerDeg);
         azimuth_rad = azimuth_before = azimuth;
         if (has_azimuth) gain.emplace(settings.initial.gyro_bias_deg_h * kDegPerHour);
         begin_s = last_s = still_since_s = in.time_s;

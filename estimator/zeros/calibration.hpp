@@ -44,6 +44,10 @@ struct CalibrationSettings {
     Noise noise;
     Initial initial;
     Triple lever_arm_m{};  ///< from the azimuth axis to the unit, body axes
+    /// Of the first level axis (z up or down: x, y up or down: z) at azimuth 0, from east,
+    /// counter-clockwise about up. What it is off by goes into the level gyros' biases, and is
+    /// found no better than `initial.azimuth_deg` lets it.
+    double heading_deg = 0;
     double update_s = 1;
     Triple target_mg{0.15, 0.05, 0.01};  ///< of the two level axes and of the upright one
     double saturation_g = 10;            ///< of an accelerometer
@@ -58,7 +62,8 @@ struct Increment {
     double time_s = 0;
     Triple turn_rad{};
     Triple velocity_mps{};
-    double azimuth_rad = 0;           ///< read-out, positive about up; NaN: none. It may be late.
+    double azimuth_rad =
+        0;  ///< read-out, from heading_deg, positive about up; NaN: none. May be late.
     Triple reference_velocity_mps{};  ///< of the azimuth axis, east north up; 0 on the rig
     Triple reference_position_m{};
 };

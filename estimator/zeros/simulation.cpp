@@ -25,7 +25,7 @@ struct UnitSimulation::Impl {
         return settings.plan.azimuth_deg(t * real_rate) * kRadPerDeg;
     }
     [[nodiscard]] Eigen::Matrix3d attitude(double t) const {
-        const double psi = azimuth(t) + errors.azimuth_deg * kRadPerDeg;
+        const double psi = azimuth(t) + (settings.heading_deg + errors.azimuth_deg) * kRadPerDeg;
         Eigen::Matrix3d turned =
             rotation({errors.tilt_east_deg * kRadPerDeg, errors.tilt_north_deg * kRadPerDeg, 0}) *
             rotation({0, 0, psi});

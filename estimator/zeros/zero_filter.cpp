@@ -15,6 +15,7 @@ namespace {
 constexpr double kPart_s = 0.1;
 constexpr double kExact = 1e-9;  ///< of a misalignment that is declared to be none, rad
 
+/// Columns: the body's axes in east, north and up.
 Eigen::Matrix3d level_attitude(double azimuth, bool inverted) {
     Eigen::Matrix3d c;
     c << std::cos(azimuth), -std::sin(azimuth), 0, std::sin(azimuth), std::cos(azimuth), 0, 0, 0, 1;
@@ -31,11 +32,11 @@ double cross_prior(const CalibrationSettings& settings, std::size_t of, std::siz
     return of == axis ? settings.initial.gain : std::max(settings.noise.misalignment, kExact);
 }
 
-ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
+ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double heading_rad)
     : settings_(settings),
       lever_(vector(settings.lever_arm_m)),
-      strapdown_(settings.site, level_attitude(azimuth_rad, settings.inverted),
-                 level_attitude(azimuth_rad, settings.inverted) * lever_) {
+      strapdown_(settings.site, level_attitude(heading_rad, settings.inverted),
+                 level_attitude(heading_rad, settings.inverted) * lever_) {
     h_.leftCols<kStates>() = measurement_matrix(settings.site);
     const Initial& start = settings.initial;
     const Site& site = settings.site;

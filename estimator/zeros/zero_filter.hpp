@@ -19,7 +19,8 @@ using FilterVector = Eigen::Matrix<double, kFilterStates, 1>;
 /// each update the state is taken off attitude, velocity, position and biases.
 class ZeroFilter {
   public:
-    ZeroFilter(const CalibrationSettings& settings, double azimuth_rad);
+    /// `heading_rad`: of the first level axis now, from east, counter-clockwise about up.
+    ZeroFilter(const CalibrationSettings& settings, double heading_rad);
 
     void advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity, double dt_s);
     /// The vertical gyro has turned so much too far about its own axis, rad, positive about up.

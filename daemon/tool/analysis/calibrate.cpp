@@ -109,13 +109,8 @@ void warn_of_outliers(Study& study) {
                         study.lines[i], size, limit));
         }
     }
-    if (!study.result.test) {
-        study.warnings.emplace_back(
-            study.result.degrees == 0
-                ? "no test of the residuals: as many readings as coefficients"
-                : "no test of the residuals: neither the noise is stated (--sigma) nor is an input "
-                  "repeated");
-    }
+    if (!study.result.test)
+        study.warnings.push_back("no test of the residuals: " + study.result.untested);
 }
 
 Json test_json(const Study& study) {

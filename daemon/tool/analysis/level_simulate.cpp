@@ -3,6 +3,7 @@
 #include <iostream>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
@@ -141,11 +142,81 @@ int run_many(const Options& options) {
                              many.times.size(), options.runs, many.late, many.bound, many.falsely)
                   << printed(
                          "time after the start or the step: median %.5g s, 95 %% within %.5g s, "
-                         "longest %.5g s\nlargest tilt when declared %.3g' (tolerance %.3g')\n",
+                         "longest %.5g s\nlargest tilt when declared, besides the accelerometers' "
+                         "zero, %.3g' (tolerance %.3g')\n",
                          many.time_within(0.5), many.time_within(0.95), many.time_within(1),
                          many.worst_tilt / kRadPerArcmin, tolerance / kRadPerArcmin);
     }
     return many.never == 0 && 20 * many.late <= options.runs && many.falsely == 0 ? 0 : kNo;
+}
+
+/// Largest tilt over the last settling time, or all of a shorter run, besides what the
+/// accelerometers' zeros ask for, rad.
+double tilt_at_last(const levelling::SimulatedStart& run, const levelling::Scenario& start,
+                    double gravity) {
+    double largest = 0;
+    for (const levelling::TracePoint& point : run.trace) {
+        if (point.time_s < run.trace.back().time_s - start.loop.settling_s) continue;
+        for (std::size_t i = 0; i < 2; ++i)
+            largest = std::max(largest, std::abs(point.tilt[i] + start.zero[i] / gravity));
+    }
+    return largest;
+}
+
+/// One start, and what there is to say of it.
+struct OneStart {
+    levelling::Scenario start;
+    levelling::SimulatedStart run;
+    levelling::Leveller leveller;
+    double at_last = 0;  ///< rad
+    bool settled = false;
+    [[nodiscard]] bool fast() const { return start.network == levelling::Network::fast; }
+};
+
+std::string json_of(const Options& options, const OneStart& of) {
+    const auto both = [](const Pair& p, double unit) {
+        return Json::array(
+            {proto::number_or_null(p[0] / unit), proto::number_or_null(p[1] / unit)});
+    };
+    Json result = {{"network", options.network}};
+    if (of.fast()) result["gains"] = gains_json(of.start.loop.fast);
+    result["seed"] = options.seed;
+    result["tilt_arcmin"] = both(of.run.trace.back().tilt, kRadPerArcmin);
+    result["tilt_deviation_arcmin"] = of.run.tilt_deviation() / kRadPerArcmin;
+    result["tolerance_arcmin"] = of.leveller.tolerance() / kRadPerArcmin;
+    if (of.fast()) {
+        result["verdict"] = levelling::name_of(of.run.verdict);
+        result["settled_s"] = of.run.settled_s >= 0 ? Json(of.run.settled_s) : Json(nullptr);
+        result["force_arcmin"] = both(of.run.observables.force_rad, kRadPerArcmin);
+        result["drift_deg_h"] = both(of.run.drift, kDegPerHour);
+        result["noise"] = budget_json(of.leveller);
+        result["message"] = of.run.message;
+    } else {
+        result["verdict"] = of.settled ? "settled" : "not settled";
+        result["last_tilt_arcmin"] = of.at_last / kRadPerArcmin;
+    }
+    return proto::json_text(result) + "\n";
+}
+
+std::string text_of(const OneStart& of) {
+    const Pair end = of.run.trace.back().tilt;
+    const double tolerance = of.leveller.tolerance() / kRadPerArcmin;
+    std::string text = printed("tilt after %.6g s: %.4g' and %.4g'\n", of.start.duration_s,
+                               end[0] / kRadPerArcmin, end[1] / kRadPerArcmin);
+    if (!of.fast())
+        return text + printed(
+                          "%s: at most %.4g' over the last %.4g s besides the accelerometers' "
+                          "zero; tolerance %.3g'\n",
+                          of.settled ? "settled" : "not settled", of.at_last / kRadPerArcmin,
+                          std::min(of.start.loop.settling_s, of.start.duration_s), tolerance);
+    text += of.settled ? printed("settled after %.5g s", of.run.settled_s)
+                       : std::string(levelling::name_of(of.run.verdict));
+    text += printed("; tolerance %.3g'\n", tolerance) +
+            printed("drift found: %.5g and %.5g deg/h\n", of.run.drift[0] / kDegPerHour,
+                    of.run.drift[1] / kDegPerHour) +
+            budget_table(of.leveller);
+    if (!of.run.message.empty()) text += "note: " + of.run.message + '\n';
+    return text;
 }
 
 }  // namespace
@@ -165,49 +236,13 @@ int run_simulate(const Options& options) {
         return run_many(options);
     }
     const levelling::Scenario start = scenario_of(options);
-    const levelling::SimulatedStart run = levelling::simulate(start);
-    const levelling::Leveller leveller(start.loop);
-    const Pair end = run.trace.back().tilt;
-    if (!options.plot.empty()) {
-        plot_run(options.plot, run);
-    }
-    const bool fast = start.network == levelling::Network::fast;
-    if (options.json) {
-        const auto both = [](const Pair& p, double unit) {
-            return Json::array(
-                {proto::number_or_null(p[0] / unit), proto::number_or_null(p[1] / unit)});
-        };
-        Json result = {{"network", options.network},
-                       {"gains", gains_json(start.loop.fast)},
-                       {"seed", options.seed},
-                       {"tilt_arcmin", both(end, kRadPerArcmin)},
-                       {"tilt_deviation_arcmin", run.tilt_deviation() / kRadPerArcmin}};
-        if (fast) {
-            result["verdict"] = levelling::name_of(run.verdict);
-            result["settled_s"] = run.settled_s >= 0 ? Json(run.settled_s) : Json(nullptr);
-            result["force_arcmin"] = both(run.observables.force_rad, kRadPerArcmin);
-            result["drift_deg_h"] = both(run.drift, kDegPerHour);
-            result["tolerance_arcmin"] = leveller.tolerance() / kRadPerArcmin;
-            result["noise"] = budget_json(leveller);
-            result["message"] = run.message;
-        }
-        std::cout << proto::json_text(result) << '\n';
-    } else {
-        std::cout << printed("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
-                             end[0] / kRadPerArcmin, end[1] / kRadPerArcmin);
-        if (fast) {
-            std::cout << (run.settled_s >= 0 ? printed("settled after %.5g s", run.settled_s)
-                                             : std::string(levelling::name_of(run.verdict)))
-                      << printed("; tolerance %.3g'\n", leveller.tolerance() / kRadPerArcmin)
-                      << printed("drift found: %.5g and %.5g deg/h\n", run.drift[0] / kDegPerHour,
-                                 run.drift[1] / kDegPerHour)
-                      << budget_table(leveller);
-            if (!run.message.empty()) {
-                std::cout << "note: " << run.message << '\n';
-            }
-        }
-    }
-    return fast && run.settled_s < 0 ? kNo : 0;
+    OneStart of{start, levelling::simulate(start), levelling::Leveller(start.loop)};
+    // The other networks have no verdict of their own.
+    of.at_last = tilt_at_last(of.run, start, options.gravity);
+    of.settled = of.fast() ? of.run.settled_s >= 0 : of.at_last <= of.leveller.tolerance();
+    if (!options.plot.empty()) plot_run(options.plot, of.run);
+    std::cout << (options.json ? json_of(options, of) : text_of(of));
+    return of.settled ? 0 : kNo;
 }
 
 }  // namespace vibrig::tool::level_command

@@ -29,6 +29,10 @@ using namespace estimator::spectrum;
 using Eigen::Index;
 using PredictionJson = nlohmann::ordered_json;
 
+/// Of the strongest level that was measured: from where on a note says so, and where it is too
+/// much.
+constexpr double kNotedBeyond = 1.5, kMostBeyond = 3;
+
 struct PredictOptions {
     std::string result, profile, config, at = "platform", recording;
     std::vector<std::string> attitudes;
@@ -182,8 +186,24 @@ struct Predicted {
     std::optional<Verification> verification;
     Held held;
     std::string refusal, note;
-    [[nodiscard]] bool covered() const { return prediction.covered(); }
+    double g_rms = 0;           ///< at the platform
+    double measured_g_rms = 0;  ///< of the strongest dwell; 0: the result does not say
+    /// That the drift goes with the square is proven for what was measured, and little beyond.
+    [[nodiscard]] double level() const { return measured_g_rms > 0 ? g_rms / measured_g_rms : 0; }
+    [[nodiscard]] bool covered() const { return prediction.covered() && level() <= kMostBeyond; }
 };
+
+void add_note(Predicted& of, const std::string& note) {
+    of.note += (of.note.empty() ? "" : "; ") + note;
+}
+
+void compare_levels(Predicted& of) {
+    if (of.level() <= kNotedBeyond) return;
+    add_note(of, printed("%.3g g rms at the platform are %.2g times the strongest vibration that "
+                         "was measured, %.3g g rms: that the drift goes with its square up to "
+                         "there is not proven",
+                         of.g_rms, of.level(), of.measured_g_rms));
+}
 
 std::string predicted_json(const Predicted& of) {
     PredictionJson verification = nullptr;
@@ -203,6 +223,9 @@ std::string predicted_json(const Predicted& of) {
         {"prediction",
          {{"profile", of.profile.name},
           {"g_rms", std::sqrt(mean_square(of.profile))},
+          {"platform_g_rms", of.g_rms},
+          {"measured_g_rms",
+           of.measured_g_rms > 0 ? PredictionJson(of.measured_g_rms) : PredictionJson(nullptr)},
           {"power_outside", of.prediction.power_outside},
           {"verdict", of.covered() ? "covered" : "not covered"},
           {"note", of.note.empty() ? PredictionJson(nullptr) : PredictionJson(of.note)},
@@ -228,8 +251,12 @@ std::string predicted_text(const Predicted& of) {
                          p.u(row, j), p.coefficients(row, j), p.resonance(row, j), p.gain(row, j),
                          p.realisation(row, j), p.outside(row, j));
     }
-    text += line("%.1f %% of the profile's power lies outside what was measured: %s",
-                 100 * of.prediction.power_outside, of.covered() ? "covered" : "NOT COVERED");
+    text += line("%.1f %% of the profile's power lies outside what was measured%s: %s",
+                 100 * of.prediction.power_outside,
+                 of.level() > kMostBeyond
+                     ? printed(", and its level is %.2g times as high", of.level()).c_str()
+                     : "",
+                 of.covered() ? "covered" : "NOT COVERED");
     if (of.verification) {
         const Verification& v = *of.verification;
         text += line("held-out dwells: chi-square %.1f of %d, p = %.2g: %s", v.chi_square,
@@ -278,9 +305,12 @@ Predicted predict_for(const PredictOptions& options) {
     const AtPlatform vibration =
         at_platform(out.profile, stated.at.empty() ? options.at : stated.at, rig);
     if (vibration.behind_pads && !vertical(vibration.moment))
-        out.note =
-            "the isolators' transmission is measured along the vertical, and is taken for every "
-            "direction";
+        add_note(out,
+                 "the isolators' transmission is measured along the vertical, and is taken for "
+                 "every direction");
+    out.g_rms = std::sqrt(vibration.moment.trace());
+    out.measured_g_rms = strongest_g_rms(result);
+    compare_levels(out);
     const PredictionOptions how{options.elastic_beyond.value_or(rig.spectrum.elastic_beyond),
                                 options.same_accelerometers};
     std::vector<Situation> situations;
@@ -331,7 +361,7 @@ void add_predict(CLI::App& app, int& exit_code) {
                        "or of a [[profile]] of the configuration");
     command
         .add_option("--attitude", options.attitudes,
-                    "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")
+                    "ALPHA,BETA,GAMMA of the gimbals (no encoder readings), deg; again for more")
         ->allow_extra_args(false);
     command.add_option("--at", options.at, "where the profile holds: platform, or table (pads)")
         ->check(CLI::IsMember({"platform", "table"}));

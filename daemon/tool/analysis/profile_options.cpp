@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
 #include <stdexcept>
 
 #include "estimator/spectrum/profile_moments.hpp"
@@ -26,6 +28,18 @@ plan::StatedProfile find_profile(const std::string& name, const configuration::C
                                  "', expected a JSON file or one of " + known +
                                  "minimum-integrity, truck");
     return plan::read_profile(name);
+}
+
+double strongest_g_rms(const nlohmann::json& result) {
+    const auto rows = result.find("dwell_rates");
+    if (rows == result.end() || !rows->is_array()) return 0;
+    // Levels are peaks of a sine of the same mean square.
+    double peak = 0;
+    for (const auto& row : *rows) {
+        const auto level = row.find("level");
+        if (level != row.end() && level->is_number()) peak = std::max(peak, level->get<double>());
+    }
+    return peak / std::numbers::sqrt2;
 }
 
 AtPlatform at_platform(const Profile& profile, const std::string& at,

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,10 @@ struct AtPlatform {
 [[nodiscard]] AtPlatform at_platform(const estimator::spectrum::Profile& profile,
                                      const std::string& at,
                                      const configuration::Configuration& rig);
+
+/// Of the strongest dwell of a result (vibrig identify --json) at the platform, g rms; 0: it does
+/// not say.
+[[nodiscard]] double strongest_g_rms(const nlohmann::json& result);
 
 /// "ALPHA,BETA,GAMMA" of the gimbals, deg. Throws std::runtime_error.
 [[nodiscard]] std::array<double, 3> read_attitude(const std::string& text);

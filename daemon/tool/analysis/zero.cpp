@@ -28,6 +28,7 @@ namespace {
 struct Options {
     zeros::CalibrationSettings calibration;
     double latitude_deg = 45.75;
+    std::optional<double> heading_deg;
     double scale_ppm = 100;
     double misalignment_arcsec = 50;
     std::vector<double> slews{0, 90, -90, 90};
@@ -55,6 +56,7 @@ zeros::CalibrationSettings settings_of(const Options& options) {
     s.noise.scale_factor = options.scale_ppm * 1e-6;
     s.noise.misalignment = options.misalignment_arcsec * kRadPerArcsec;
     s.plan.targets_deg = options.slews;
+    s.heading_deg = options.heading_deg.value_or(0);
     s.upright = options.upright == "y" ? 1 : 2;
     for (std::size_t i = 0; i < 3; ++i) s.lever_arm_m[i] = options.lever_arm[i];
     return s;
@@ -91,14 +93,22 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
     if (results.size() > 1) apart = zeros::together(results);
     const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
     if (!options.plot.empty()) plot_runs(options.plot, runs);
+    // A simulated unit stands as it is told.
+    const bool assumed = !options.file.empty() && !options.heading_deg;
     if (options.json) {
         Json json = result_json(result, seen);
+        json["heading_deg"] = s.heading_deg;
+        json["heading_assumed"] = assumed;
         if (apart) {
             json["apart"] = apart_json(*apart);
         }
         std::cout << proto::json_text(json) << '\n';
     } else {
         std::cout << result_table(result, seen);
+        if (assumed)
+            std::cout << "assumed: at azimuth 0 the unit's "
+                      << kAxisLetters[static_cast<std::size_t>(result.upright + 1) % 3]
+                      << " points true east (--heading)\n";
         if (apart) {
             std::cout << apart_table(*apart);
         }
@@ -249,6 +259,10 @@ void add_common(CLI::App& command, Options& o) {
     zeros::CalibrationSettings& s = o.calibration;
     add_number(command, "--latitude", o.latitude_deg, "deg (45.75)", -89, 89);
     add_number(command, "--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)", 1, 30);
+    add_number(command, "--heading", o.heading_deg,
+               "of platform x (of z with --upright y, --y-up and --y-down) at azimuth 0, deg from "
+               "true east, counter-clockwise about up: 90 is north (0)",
+               -360, 360);
     add_numbers(command, "--slews", o.slews, 0,
                 "azimuths in deg (0,90,-90,90); the last two repeat", -360, 360);
     add_number(command, "--rate", s.plan.rate_deg_s, "of the slews, deg/s (5)", kAboveZero, 100);
@@ -294,7 +308,9 @@ void add_zero(CLI::App& app, int& exit_code) {
                         "increments, CSV or gzip: time_s, turn_x_arcsec ..., dv_x_mps ..., "
                         "azimuth_deg");
     command->add_option("--azimuth", options->azimuth,
-                        "column of the azimuth read-out (azimuth_deg), or none");
+                        "column of the azimuth read-out (azimuth_deg), or none; positive "
+                        "counter-clockwise about up, whichever way up the unit is, and from a true "
+                        "heading that --heading states");
     add_common(*command, *options);
     command
         ->add_option("--down", options->down,

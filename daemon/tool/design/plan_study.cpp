@@ -312,23 +312,44 @@ class Study {
         };
         std::vector<planning::Experiment> experiments;
         for (const auto& visit : candidates_.visits) experiments.push_back(experiment(visit));
-        const std::vector<double> before = covariance_done(experiments);
-        const auto found = planning::augment(before, experiments, target,
-                                             request_.runs > 0 ? request_.runs : kMostForTargets);
-        if (!found.met) {
-            out_.refusal = "the targets are not met with " + std::to_string(found.runs.size()) +
-                           " runs, expected more runs or wider targets";
-        }
+        planning::Effort effort = done();
+        effort.resize(candidates_.visits.size(), 0.0);
+        const std::size_t at_most = request_.runs > 0 ? request_.runs : kMostForTargets;
         planning::Counts counts(candidates_.visits.size(), 0);
-        for (const std::size_t i : found.runs) ++counts[i];
+        add_for(target, experiments, effort, at_most, counts);
+        // A target of 0 asks for nothing, and the prior is no measurement: then the runs that
+        // determine everything come first.
+        const std::size_t lacking = rank_lacking(effort, {});
+        if (rank_lacking(effort, counts) == 0 || lacking > at_most) return counts;
+        counts = planning::exact_design(candidates_.problem, lacking, {0, request_.seed, effort});
+        add_for(target, experiments, effort, at_most - lacking, counts);
         return counts;
     }
 
-    /// The prior, and what is measured already.
-    [[nodiscard]] std::vector<double> covariance_done(
-        const std::vector<planning::Experiment>& experiments) {
-        return planning::covariance_after(prior_of_all(), experiments, done());
+    /// Those that are missed by the runs done already and those of `counts`, `at_most` more.
+    void add_for(const std::vector<double>& target,
+                 const std::vector<planning::Experiment>& experiments, planning::Effort effort,
+                 std::size_t at_most, planning::Counts& counts) {
+        for (std::size_t i = 0; i < counts.size(); ++i) effort[i] += static_cast<double>(counts[i]);
+        const auto found =
+            planning::augment(planning::covariance_after(prior_of_all(), experiments, effort),
+                              experiments, target, at_most);
+        for (const std::size_t i : found.runs) ++counts[i];
+        out_.refusal.clear();
+        if (found.met) return;
+        std::size_t all = 0;
+        for (const std::size_t count : counts) all += count;
+        out_.refusal = "the targets are not met with " + std::to_string(all) +
+                       " runs, expected more runs or wider targets";
     }
+
+    [[nodiscard]] std::size_t rank_lacking(planning::Effort effort,
+                                           const planning::Counts& counts) const {
+        for (std::size_t i = 0; i < counts.size(); ++i) effort[i] += static_cast<double>(counts[i]);
+        const auto evaluation = planning::evaluate(candidates_.problem, effort);
+        return evaluation.coefficients - evaluation.rank;
+    }
+
     [[nodiscard]] std::vector<double> prior_of_all() const {
         const auto prior = estimator::prior_sigma(c_.estimator);
         std::vector<double> sigma;

@@ -435,8 +435,10 @@ void add_reports(CLI::App& app, int& exit_code) {
     compensating.add_option("-o,--output", compensation.output,
                             "file to write (default: standard output)");
     compensating
-        .add_option("--attitude", compensation.attitude,
-                    "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
+        .add_option(
+            "--attitude", compensation.attitude,
+            "outer, inner, azimuth of the gimbals (no encoder readings) in deg at which the "
+            "drift is predicted (default 0,0,0)")
         ->delimiter(',')
         ->expected(3);
     // As text: CLI11 takes an empty one for 0.

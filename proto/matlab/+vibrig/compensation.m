@@ -3,8 +3,8 @@ function [drift, residual, determined] = compensation(campaign, attitude_deg, va
 %
 %   [drift, residual, determined] = vibrig.compensation(c, [45 0 90], 'table_g', 9)
 %
-%   ATTITUDE_DEG are encoder angles outer, inner, azimuth; 'table_g' or 'platform_g' the peak of the vibration, neither:
-%   at rest. DRIFT and RESIDUAL (1 sigma) are deg/h about the input axes of gyros x, y, z (3 x 1), as `vibrig compensate`
+%   ATTITUDE_DEG are gimbal angles outer, inner, azimuth (no encoder readings); 'table_g' or 'platform_g' the peak of the
+%   vibration, neither: at rest. DRIFT and RESIDUAL (1 sigma) are deg/h about the input axes of gyros x, y, z (3 x 1), as `vibrig compensate`
 %   gives them. Quadratic coefficients that depend on the frequency foretell no vibration: then the level must be 0.
 %   They are h.D and sqrt(h'Ph) of Tang et al. 2009, eqs 8-9 with k1 = 1, k2 = 1 + a^2 / 2.
 if numel(attitude_deg) ~= 3 || ~all(isfinite(attitude_deg))
@@ -26,8 +26,7 @@ if level > 0 && isfield(campaign.result, 'spectrum') && depends_on_frequency(cam
                             '(vibrig predict has the drift under a vibration)']);
 end
 kappa = 1 + level^2 / 2;
-turned = value_of(campaign, 'platform.encoder_sign') .* (attitude_deg(:)' - value_of(campaign, 'platform.encoder_zero_deg'));
-a = turned(1); b = turned(2); g = turned(3);
+a = attitude_deg(1); b = attitude_deg(2); g = attitude_deg(3);
 rx = [1 0 0; 0 cosd(a) -sind(a); 0 sind(a) cosd(a)];
 ry = [cosd(b) 0 sind(b); 0 1 0; -sind(b) 0 cosd(b)];
 rz = [cosd(g) -sind(g) 0; sind(g) cosd(g) 0; 0 0 1];

@@ -220,7 +220,7 @@ class Campaign:
                      platform_g: float | None = None) -> Drift:
         """What the gyros drift at an attitude under vibration, and what compensation leaves; as `vibrig compensate`.
 
-        `attitude_deg`: encoder angles outer, inner, azimuth; peak at the table or at the platform, g, neither: at rest.
+        `attitude_deg`: gimbal angles outer, inner, azimuth (no encoder readings); peak at the table or at the platform, g, neither: at rest.
         Raises ValueError, also where the quadratic coefficients depend on the frequency and the level is not 0.
         """
         if table_g is not None and platform_g is not None:
@@ -231,7 +231,7 @@ class Campaign:
             settings = self.configuration
             level = platform_g or (table_g or 0.0) * settings["vibration"]["transmission"]
             platform = settings["platform"]
-            up = up_in_platform(attitude_deg, platform["up"], platform["encoder_sign"], platform["encoder_zero_deg"])
+            up = up_in_platform(attitude_deg, platform["up"])
             axes = [platform[f"gyro_{g}_axes"] for g in "xyz"]
         if not 0 <= level <= 1000:
             raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")

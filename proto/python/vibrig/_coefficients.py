@@ -136,12 +136,10 @@ def signed_axis(name: str) -> Array:
     return axis
 
 
-def up_in_platform(attitude_deg: Sequence[float], up: str, encoder_sign: Sequence[int],
-                   encoder_zero_deg: Sequence[float]) -> Array:
-    """The vertical in platform axes, (3,), at encoder angles outer, inner, azimuth:
+def up_in_platform(attitude_deg: Sequence[float], up: str) -> Array:
+    """The vertical in platform axes, (3,), at gimbal angles outer, inner, azimuth:
     Rz(azimuth) Ry(inner) Rx(outer) up, with right-handed turns of vectors."""
-    a, b, g = (math.radians(sign * (angle - zero))
-               for angle, sign, zero in zip(attitude_deg, encoder_sign, encoder_zero_deg))
+    a, b, g = (math.radians(angle) for angle in attitude_deg)
     ca, sa, cb, sb, cg, sg = math.cos(a), math.sin(a), math.cos(b), math.sin(b), math.cos(g), math.sin(g)
     rx = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
     ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])

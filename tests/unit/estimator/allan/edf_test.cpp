@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -97,6 +98,51 @@ TEST(NoiseIdentification, WhereTwoNoisesCrossTheIntervalIsNotTooNarrow) {
         EXPECT_LE(stated, found * (1 + 4 * std::sqrt(2.0 / kRuns)))
             << "m = " << m << ", seeds from 40000";
     }
+}
+
+/// tr(C)^2 / tr(C^2) of differences with this covariance C, which a difference of white FM has.
+double edf_of_white_frequency(std::size_t points, std::size_t m, std::size_t order,
+                              std::size_t stride) {
+    const std::vector<double> weight =
+        order == 2 ? std::vector<double>{1, -2, 1} : std::vector<double>{-1, 3, -3, 1};
+    double squares = 0, own = 0;
+    const std::size_t rows = (points - order * m - 1) / stride + 1;
+    for (std::size_t i = 0; i < rows; ++i) {
+        for (std::size_t k = 0; k < rows; ++k) {
+            double c = 0;
+            for (std::size_t a = 0; a <= order; ++a) {
+                for (std::size_t b = 0; b <= order; ++b)
+                    c += weight[a] * weight[b] *
+                         static_cast<double>(std::min(i * stride + a * m, k * stride + b * m));
+            }
+            squares += c * c;
+            if (i == k) own += c;
+        }
+    }
+    return own * own / squares;
+}
+
+TEST(Interval, DegreesOfFreedomOfWhiteFrequencyAreExact) {
+    // GIVEN the phase of white FM, a random walk that is read, not averaged
+    constexpr std::size_t kPoints = 301;
+    struct Case {
+        Statistic statistic;
+        std::size_t order;
+        bool overlapping;
+    };
+    for (const Case& c : {Case{Statistic::adev, 2, false}, Case{Statistic::hdev, 3, false},
+                          Case{Statistic::ohdev, 3, true}}) {
+        for (const std::size_t m : {1U, 2U, 4U, 16U}) {
+            const double exact = edf_of_white_frequency(kPoints, m, c.order, c.overlapping ? 1 : m);
+            // THEN they are those of the differences' covariance
+            EXPECT_NEAR(edf(c.statistic, 0, kPoints, m) / exact, 1, 1e-6)
+                << "order " << c.order << ", m = " << m;
+        }
+    }
+    // AND the modified variance of single points is the plain one
+    EXPECT_NEAR(edf(Statistic::mdev, 0, 1001, 1), 666, 1);
+    EXPECT_NEAR(edf(Statistic::adev, 0, 1001, 1), 666, 1);
+    EXPECT_NEAR(edf(Statistic::hdev, 0, 1001, 1), 513.5, 1);
 }
 
 TEST(Interval, TotalDeviationOfWhitePhaseKnowsItsReflectedEnds) {

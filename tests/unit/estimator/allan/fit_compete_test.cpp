@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <utility>
 
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/fit.hpp"
@@ -116,6 +117,16 @@ TEST(Compete, MonteCarloOneSlowNoiseIsNotAnother) {
             EXPECT_TRUE(truth[at(term)] == 0 || t.detected[at(term)] == t.runs)
                 << kTermNames[at(term)] << ", seeds from 4800";
         }
+    }
+}
+
+TEST(Compete, MonteCarloBoundsOfShortRecordsHold) {
+    // GIVEN records of some minutes, in which N is seldom detected where K is strong
+    constexpr std::uint64_t kSeed = 20'000;
+    for (const auto& [samples, walk] :
+         {std::pair<std::size_t, double>{100, 0.0}, {200, 1.0}, {300, 0.2}, {500, 1.0}}) {
+        const Terms truth{0, 0.001, 0, walk, 0};
+        expect_intervals(tally(truth, 300, kSeed, samples), truth, kSeed);
     }
 }
 

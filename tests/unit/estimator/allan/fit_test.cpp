@@ -227,11 +227,9 @@ TEST(Fit, TellsWhenARampCannotBeSeparatedFromARandomWalk) {
     const Fit fit = fit_noise(exact_curve(truth), kPoints, 1.0);
     EXPECT_FALSE(fit.terms[4].detected);
     // THEN the note's bound is the standard deviation of the slope that such a walk makes by
-    // itself in 10 h, its record 4 K^2 / R^2 with the ramp that was found
+    // itself in 10 h; of a ramp that is not detected nothing is promised
     EXPECT_NEAR(number_behind(fit.ramp_note, "K/sqrt(T) = "), kWalk / std::sqrt(10), 0.02);
-    const double found = fit.terms[4].value;
-    const double hours = number_behind(fit.ramp_note, "a record of ");
-    EXPECT_NEAR(hours, 4 * kWalk * kWalk / (found * found), 0.2 * hours);
+    EXPECT_EQ(fit.ramp_note.find("; "), std::string::npos) << fit.ramp_note;
     EXPECT_GE(fit.terms[4].below, kRamp);
     // AND it is so: in a record ten times longer than what the true ramp needs it is found, in one
     // of a tenth of that it is not
@@ -248,6 +246,19 @@ TEST(Fit, TellsWhenARampCannotBeSeparatedFromARandomWalk) {
         EXPECT_EQ(longer.ramp_note.empty(), times > 1) << longer.ramp_note;
     }
     EXPECT_TRUE(fit_noise(exact_curve({0, 0.001, 0, 0, 5}), kPoints, 1.0).ramp_note.empty());
+}
+
+TEST(Fit, BoundsOfAShortRecordAreOfItsSize) {
+    // GIVEN 100 samples of white noise of 0.06 deg/h, whose longest average of one difference may
+    // be next to nothing by chance
+    for (unsigned seed = 1; seed <= 100; ++seed) {
+        const Fit fit = fit_record(synthetic_rate({0, 0.001, 0, 0, 0}, 100, 1.0, seed));
+        // THEN no noise is allowed that would be ten times all of it over the record
+        for (std::size_t j = 0; j < kTerms; ++j) {
+            const double most = std::sqrt(term_variance(static_cast<Term>(j), j < 2 ? 1.0 : 100.0));
+            EXPECT_LT(fit.terms[j].below * most, 0.6) << kTermNames[j] << ", seed " << seed;
+        }
+    }
 }
 
 TEST(Fit, NeedsTwoPoints) { EXPECT_THROW(static_cast<void>(fit_noise({}, 10, 1.0)), DataError); }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -45,7 +46,7 @@ class CalibrateCommand : public vibrig::test::VibrigCommand {
     void write(const std::string& name, const std::vector<Reading>& list) const {
         std::ostringstream text;
         text.precision(17);
-        text << "x1,x2,x3,y\n";
+        text << "# turntable, by hand\nx1,x2,x3,y\n";
         for (const Reading& r : list)
             text << r.input[0] << ',' << r.input[1] << ',' << r.input[2] << ',' << r.output << '\n';
         write(name, text.str());
@@ -101,11 +102,22 @@ TEST_F(CalibrateCommand, SaysNoWhereTheReadingsDo) {
     write("cubic.csv", readings({1, 2}, 2, 3, true, 2 * kSigma));
     EXPECT_EQ(vibrig("calibrate cubic.csv"), 1);
     EXPECT_NE(out.find("does NOT hold"), std::string::npos) << out;
+    // Readings of a coarse converter agree exactly: what the model leaves may be its steps, or not.
+    std::vector<Reading> coarse = readings({1, 2}, 1, 3, true, 0.05);
+    for (Reading& r : coarse) r.output = std::round(r.output * 100) / 100;
+    coarse.insert(coarse.end(), coarse.begin(), coarse.end());
+    write("coarse.csv", coarse);
+    EXPECT_EQ(vibrig("calibrate coarse.csv"), 0);
+    EXPECT_NE(
+        out.find("no test of the residuals: repeated readings agree exactly, the model leaves "
+                 "0.0"),
+        std::string::npos)
+        << out;
     std::vector<Reading> list = readings({1, 2}, 2, 3, true);
     list[10].output += 20 * kSigma;
     write("outlier.csv", list);
     EXPECT_EQ(vibrig("calibrate outlier.csv --sigma 2e-6"), 1);
-    EXPECT_NE(out.find("line 12:"), std::string::npos) << out;
+    EXPECT_NE(out.find("line 13:"), std::string::npos) << out;
 }
 
 TEST_F(CalibrateCommand, TurntablePlansAreThePapers) {
@@ -147,6 +159,7 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
     write("nan.csv", "x1,x2,x3,y\n1,0,0,nan\n");
     write("cut.csv", "x1,x2,x3,y\n1,0,0\n");
     write("few.csv", "x1,x2,x3,y\n1,0,0,1\n");
+    write("comma.csv", "x1,x2,x3,y\n1,0,0,1\n-1,0,0,0,505\n");
     write("sigma.csv", "x1,x2,x3,y,sigma\n1,0,0,1,-2\n");
     write("count.csv", "x1,x2,x3,y,count\n1,0,0,1,4\n");
     write("still.csv", "x1,x2,x3,y\n" + many("0,0,0,1\n", 12));
@@ -172,6 +185,7 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"calibrate none.csv", "no column x3"},
           Case{"calibrate word.csv", "word.csv:3: column y: found 'one'"},
           Case{"calibrate nan.csv", "nan.csv:2: column y: found 'nan'"},
+          Case{"calibrate comma.csv", "comma.csv:3: found 5 fields, expected 4 as in the header"},
           Case{"calibrate cut.csv", "cut.csv:2: column y: found nothing"},
           Case{"calibrate few.csv", "few.csv: found 1 readings, expected 10"},
           Case{"calibrate sigma.csv", "sigma.csv:2: column sigma: found -2"},

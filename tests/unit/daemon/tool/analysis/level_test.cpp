@@ -56,11 +56,22 @@ TEST_F(LevelCommand, SimulatesAStart) {
     EXPECT_EQ(vibrig("level simulate --plot charts"), 0) << error;
     EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / "tilt.svg"));
     EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / "rate.svg"));
-    const Json undamped = json("level simulate --network undamped --tilt 1,1 --duration 5000", 0);
+    // What swings does not settle, and has none of the fast network's gains; what is damped
+    // settles.
+    const Json undamped = json("level simulate --network undamped --tilt 1,1 --duration 5000", 1);
     EXPECT_GT(undamped["tilt_deviation_arcmin"], 0.5);
+    EXPECT_EQ(undamped["verdict"], "not settled");
+    EXPECT_GT(undamped["last_tilt_arcmin"], undamped["tolerance_arcmin"]);
+    EXPECT_FALSE(undamped.contains("gains"));
+    EXPECT_EQ(vibrig("level simulate --network conventional --zero 1,0 --duration 20000"), 0);
+    EXPECT_NE(out.find("settled: at most"), std::string::npos) << out;
     const Json many = json("level simulate --tolerance 0.2 --window 10 --step 2 --runs 50", 0);
     EXPECT_EQ(many["settled"], 50);
     EXPECT_EQ(many["false"], 0);
+    EXPECT_EQ(vibrig("level simulate --runs 2 --zero 1,1"), 0);
+    EXPECT_NE(out.find("largest tilt when declared, besides the accelerometers' zero, "),
+              std::string::npos)
+        << out;
     // Six degrees are not for this loop; a loop given no time has not settled.
     EXPECT_EQ(vibrig("level simulate --tilt 400,0"), 1);
     EXPECT_NE(out.find("coarse levelling first"), std::string::npos);

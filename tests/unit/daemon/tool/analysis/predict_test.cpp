@@ -400,6 +400,31 @@ TEST_F(Predict, AlongThreeAxesAtOnceEachHasItsPart) {
     EXPECT_EQ(drift(up, "--at table --config pads.toml")["note"], nullptr);
 }
 
+TEST_F(Predict, ALevelFarBeyondWhatWasMeasuredIsNotCovered) {
+    // GIVEN a survey at 6 g, 4.24 g rms, WHEN sines of 1, 2 and 5 times that are foretold
+    struct Case {
+        double peak;
+        int exit_code;
+        bool noted;
+    };
+    for (const Case& c : {Case{6, 0, false}, Case{12, 0, true}, Case{30, 1, true}}) {
+        write("strong.json", R"({"sines": [[25, )" + std::to_string(c.peak) + "]]}");
+        const std::string command = "predict result.json --profile strong.json --attitude 0,0,0";
+        const Ended ended = run(command + " --json");
+        EXPECT_EQ(ended.exit_code, c.exit_code) << c.peak;
+        const PredictJson prediction = ended.json()["prediction"];
+        EXPECT_NEAR(prediction["measured_g_rms"], 6 / std::sqrt(2), 0.1);
+        EXPECT_NEAR(prediction["platform_g_rms"], c.peak / std::sqrt(2), 1e-9);
+        EXPECT_EQ(prediction["verdict"], c.exit_code == 0 ? "covered" : "not covered");
+        // THEN a note says so of twice, and five times is not covered
+        EXPECT_EQ(prediction["note"].is_string(), c.noted) << prediction["note"];
+        const std::string text = run(command).out;
+        EXPECT_EQ(text.find("and its level is 5 times as high: NOT COVERED") != std::string::npos,
+                  c.exit_code == 1)
+            << text;
+    }
+}
+
 TEST_F(Predict, ListsItsProfiles) {
     const Ended ended = run("predict --list");
     EXPECT_EQ(ended.exit_code, 0);

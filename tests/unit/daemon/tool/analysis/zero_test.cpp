@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -45,6 +46,29 @@ TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {
     EXPECT_EQ(vibrig("zero run.csv --azimuth none --inverted"), 1);  // the wrong way up
     expect_refusal("zero run.csv --azimuth heading", "heading");
     expect_refusal("zero none.csv", "none.csv");
+}
+
+TEST_F(ZeroCommand, TheHeadingAtAzimuthZeroIsStatedOrSaidToBeAssumed) {
+    // GIVEN a unit whose x points 30 deg north of east at azimuth 0
+    ASSERT_EQ(vibrig("zero simulate --zero 3,-2,1 --seed 5 --heading 30 --write run.csv"), 0);
+    // WHEN that is stated THEN gyro biases and zeros are the unit's
+    const Json result = json("zero run.csv --heading 30", 0);
+    EXPECT_EQ(result["heading_deg"], 30);
+    EXPECT_EQ(result["heading_assumed"], false);
+    const std::array<double, 3> truth{3, -2, 1};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Json& axis = result["zeros"][i];
+        EXPECT_NEAR(axis["zero_mg"], truth[i], 5 * axis["filter_sigma_mg"].get<double>() + 1e-3);
+        EXPECT_LT(std::abs(result["gyro_bias_deg_h"][i].get<double>()),
+                  4 * result["gyro_sigma_deg_h"][i].get<double>());
+    }
+    // AND otherwise it is said what was taken
+    EXPECT_EQ(json("zero run.csv", 0)["heading_assumed"], true);
+    ASSERT_EQ(vibrig("zero run.csv"), 0);
+    EXPECT_NE(out.find("assumed: at azimuth 0 the unit's x points true east (--heading)"),
+              std::string::npos)
+        << out;
+    expect_refusal("zero run.csv --heading nan", "--heading: found nan");
 }
 
 TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {

@@ -134,6 +134,16 @@ TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     EXPECT_LE(json()["run_count"], 20);
     EXPECT_EQ(vibrig("plan --levels 0,6 --targets 0.0001,0,0 --runs 12"), 1) << "out of reach";
     EXPECT_EQ(vibrig("plan --levels 0,60 --runs 12"), 1) << "beyond the shaker's limits";
+    // A target of 0 asks for nothing, but the plan determines everything all the same
+    ASSERT_EQ(vibrig("plan --levels 0,6 --targets 0.0025,0,0 --json"), 0) << error;
+    EXPECT_EQ(json()["rank"], 10);
+    EXPECT_LE(json()["standard_errors"]["D_Fx"].get<double>(), 0.0025);
+    EXPECT_LE(json()["run_count"], 20);
+    // What is met with fewer runs is not given up for the sake of others
+    ASSERT_EQ(vibrig("plan --runs 10 --levels 0,6 -o ten.json"), 0) << error;
+    for (const char* targets : {"0.0029,0.003,0.0004", "0.003,0.003,0.0004"})
+        EXPECT_EQ(vibrig(std::string("plan --done ten.json --levels 0,6 --targets ") + targets), 0)
+            << error;
     // Both orders
     for (const char* order : {"travel", "random"}) {
         ASSERT_EQ(vibrig(std::string("plan --runs 20 --json --order ") + order), 0) << error;
@@ -162,6 +172,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
     write("lock.csv", "alpha_deg,beta_deg,gamma_deg\n0,85,0\n");
     write("short.csv", "alpha_deg,beta_deg\n0,0\n");
     write("empty.csv", "");
+    write("comma.csv", "alpha_deg,beta_deg,gamma_deg,level_g,count\n0,0,0,4,667,1\n");
     write("bad.json", "{\"runs\":[{\"position\":[0,0],\"level_g\":6}]}");
     write("cut.json", "{\"runs\":[{\"posi");
     write("levels.json", "{\"runs\":[{\"position\":[0,0,0],\"level_g\":6,\"table_g\":6}]}");
@@ -191,6 +202,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"--positions short.csv", "no column gamma_deg"},
           Case{"--positions empty.csv", "empty.csv"},
           Case{"--positions none.csv", "none.csv"},
+          Case{"--evaluate comma.csv", "comma.csv:2: found 6 fields, expected 5"},
           Case{"--evaluate bad.json", "runs[0].position"},
           Case{"--evaluate key.json",
                "key.json: runs[0].freqency_hz: found an unknown key, "
