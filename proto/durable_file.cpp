@@ -59,9 +59,9 @@ bool is_record(const fs::path& path) {
     return begin.starts_with("\x89HDF\r\n\x1a\n") || begin.starts_with("SQLite format 3");
 }
 
-/// What the daemon keeps beside a campaign's HDF5 files.
+/// What the daemon, or an archive, keeps beside a campaign's HDF5 files.
 bool is_of_campaign(const std::string& name) {
-    return name.ends_with(".h5") || name == "dwells.csv" ||
+    return name.ends_with(".h5") || name == "dwells.csv" || name == "archive.json" ||
            (name.starts_with("raw-") && (name.ends_with(".log") || name.ends_with(".log.zst")));
 }
 
@@ -102,10 +102,19 @@ void name_inputs(std::vector<std::string> paths) { inputs() = std::move(paths); 
 void check_output(const std::string& path) {
     std::error_code error;
     const fs::path target = fs::weakly_canonical(path, error);
-    if (error || !fs::is_regular_file(target, error)) return;
+    if (error) return;
+    const auto what = fs::status(target, error).type();
+    if (what != fs::file_type::regular && what != fs::file_type::not_found) return;
+    // A new one of such a name would be taken for the recording's just as well.
     const std::string name = target.filename().string();
-    if (name.find(".sqlite3") != std::string::npos || is_record(target) ||
-        (is_of_campaign(name) && holds_campaign(target.parent_path())))
+    const bool of_recording = name.find(".sqlite3") != std::string::npos ||
+                              (is_of_campaign(name) && holds_campaign(target.parent_path()));
+    if (what == fs::file_type::not_found && of_recording)
+        throw std::runtime_error(path +
+                                 ": found the name of a recording's file, expected another to "
+                                 "write");
+    if (what == fs::file_type::not_found) return;
+    if (of_recording || is_record(target))
         throw std::runtime_error(path + ": found a file of a recording, expected another to write");
     const auto same = [&](const std::string& input) {
         return fs::equivalent(target, input, error) && !error;

@@ -12,8 +12,8 @@ namespace vibrig::proto {
 void write_durably(const std::string& path, std::string_view text, unsigned mode = 0644);
 
 /// Refuses an output, found through symbolic links, that is a file of a recording (HDF5, a
-/// database, or what lies beside a campaign's files) or one of those that were named by
-/// name_inputs(). Throws std::runtime_error that names it.
+/// database, or what lies beside a campaign's files), has the name of one, or is one of those that
+/// were named by name_inputs(). Throws std::runtime_error that names it.
 void check_output(const std::string& path);
 /// Refuses two outputs of one name: the second would take the first one's place. Devices and "-"
 /// may be named twice. Throws std::runtime_error that names it.

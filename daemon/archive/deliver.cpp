@@ -217,6 +217,23 @@ std::optional<Entry> known_in(const Place& place, const fs::path& root, const st
     return index.campaign(*key);
 }
 
+/// A copy that was cut, or changed, must not take the place of the recording unseen. What went on
+/// later ended later.
+void refuse_rival(const Place& place, const fs::path& root, const std::string& source,
+                  const Entry& entry) {
+    std::error_code none;
+    if (!is_server(place.index) && !fs::exists(place.index, none)) return;
+    Index index(place.index, Database::Mode::write);
+    for (const std::string& key : index.rivals_of(entry)) {
+        if (!fs::is_directory(root / key, none)) continue;
+        throw ArchiveError(
+            source + ": found other files of a campaign that the archive has as " +
+            (root / key).string() +
+            ", with the same beginning and end, expected the same ones; one of them was changed or "
+            "is not whole, and this one is not archived beside the other");
+    }
+}
+
 /// Into the archive, where it is not there.
 void bring(const fs::path& own, const fs::path& root, const Place& place, Delivery& delivery,
            const Progress& progress) {
@@ -305,7 +322,9 @@ Delivery deliver(const std::string& campaign_folder, const Place& place, const s
         entry.key = within.string();
         delivery.kind = Delivery::Kind::was_there;
         delivery.folder = own.string();
+        refuse_rival(place, root, own.string(), entry);
     } else {
+        refuse_rival(place, root, own.string(), entry);
         bring(own, root, place, delivery, progress);
     }
     note(place, root, inside, delivery);

@@ -75,6 +75,24 @@ std::optional<std::string> Index::key_of(const std::string& hash) {
     });
 }
 
+std::vector<std::string> Index::rivals_of(const Entry& entry) {
+    return database_.guarded([&] {
+        std::string key;
+        soci::statement ask =
+            (database_.sql().prepare
+                 << "SELECT c.key FROM campaign c JOIN result r ON r.campaign = c.key WHERE "
+                    "c.name = :name AND c.started_utc_ns = :started AND r.rig = :rig AND "
+                    "r.ended_utc_ns = :ended AND r.hash <> :hash AND c.key <> :key ORDER BY c.key",
+             use(entry.name, "name"), use(entry.started_utc_ns, "started"), use(entry.rig, "rig"),
+             use(entry.ended_utc_ns, "ended"), use(entry.hash, "hash"), use(entry.key, "key"),
+             into(key));
+        ask.execute();
+        std::vector<std::string> found;
+        while (ask.fetch()) found.push_back(key);
+        return found;
+    });
+}
+
 std::vector<Entry> Index::campaigns(const Filter& filter) {
     return database_.guarded([&] {
         const Where where(filter);

@@ -38,6 +38,9 @@ class Index {
     void forget(const std::string& key);
     /// The key of the campaign with this hash.
     [[nodiscard]] std::optional<std::string> key_of(const std::string& hash);
+    /// Keys of the same rig's campaigns that began and ended when this one did, with other files:
+    /// only one of them can be what was recorded.
+    [[nodiscard]] std::vector<std::string> rivals_of(const Entry& entry);
     /// By their beginning; without coefficients and files.
     [[nodiscard]] std::vector<Entry> campaigns(const Filter& filter);
     /// The same with coefficients; `covariance`: these too.

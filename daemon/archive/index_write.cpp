@@ -26,13 +26,14 @@ void Index::put(const Entry& entry, bool files) {
             sql << fmt::format("DELETE FROM {} WHERE campaign = :key", table), use(entry.key);
         if (files) put_files(entry);
         put_rows(entry);
-        // It has gone on since: what was delivered before is part of this.
-        sql << "UPDATE result SET superseded = 1 WHERE rig = :rig AND campaign <> :key AND "
-               "ended_utc_ns <= :ended AND campaign IN (SELECT key FROM campaign WHERE name = "
-               ":name "
-               "AND started_utc_ns = :started)",
-            use(entry.rig, "rig"), use(entry.key, "key"), use(entry.ended_utc_ns, "ended"),
-            use(entry.name, "name"), use(entry.started_utc_ns, "started");
+        // It has gone on since: what ended earlier is part of what ended last, whichever was
+        // delivered first.
+        sql << "UPDATE result SET superseded = 1 WHERE rig = :rig AND campaign IN (SELECT key FROM "
+               "campaign WHERE name = :name AND started_utc_ns = :started) AND ended_utc_ns < "
+               "(SELECT max(r.ended_utc_ns) FROM result r JOIN campaign c ON c.key = r.campaign "
+               "WHERE r.rig = :rig2 AND c.name = :name2 AND c.started_utc_ns = :started2)",
+            use(entry.rig, "rig"), use(entry.name, "name"), use(entry.started_utc_ns, "started"),
+            use(entry.rig, "rig2"), use(entry.name, "name2"), use(entry.started_utc_ns, "started2");
         change.commit();
     });
 }

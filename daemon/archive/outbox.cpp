@@ -267,8 +267,11 @@ void Outbox::tell_moved(const std::string& line) {
 
 void Outbox::ask_history() {
     if (unit_.serial.empty()) return;
-    const Run run = run_child(command({"trend", unit_.serial}), kPatience_s, stop_);
+    std::vector<std::string> words{"trend", unit_.serial};
+    if (unit_.simulated) words.emplace_back("--simulated");
+    const Run run = run_child(command(std::move(words)), kPatience_s, stop_);
     if (run.status != 0) return;  // a new unit, or an archive that does not answer
+    if (!unit_.simulated && run.out.starts_with("SIMULATED")) return;  // no history of a real one
     const std::lock_guard lock(mutex_);
     history_ = run.out;
 }

@@ -150,8 +150,11 @@ void name_outliers(Trend& trend) {
 
 }  // namespace
 
-Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h) {
+Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated) {
     Trend trend;
+    trend.simulated = simulated;
+    trend.elsewhere = std::erase_if(
+        campaigns, [simulated](const Entry& one) { return one.simulated != simulated; });
     const std::size_t all = campaigns.size();
     std::erase_if(campaigns, [](const Entry& one) {
         return one.verdict == "not valid" ||

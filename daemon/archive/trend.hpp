@@ -42,12 +42,14 @@ struct Trend {
     std::vector<Entry> campaigns;                ///< by time, "not valid" ones left out
     std::vector<std::size_t> turn;               ///< of each campaign: in which turn-on, from 0
     std::size_t left_out = 0;                    ///< not valid, or without a result
+    bool simulated = false;                      ///< on simulated rigs, or on real ones
+    std::size_t elsewhere = 0;                   ///< left out: on the other ones
     std::vector<CoefficientTrend> coefficients;  ///< those with points
     bool several_rigs = false;
 };
 
-/// Trend of one unit's campaigns, by time.
-[[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h);
+/// Trend of one unit's campaigns, by time: those on simulated rigs, or those on real ones.
+[[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated);
 
 /// Analysis of variance of values with known standard uncertainties in groups: within the groups
 /// against the uncertainties, and between the groups against within (or the uncertainties, where no

@@ -174,6 +174,16 @@ void read_conditions(const File& file, Campaign& to) {
     to.conditions = rows_of(file, "/conditions", like);
 }
 
+/// A result, without parsing all of it.
+bool says_simulated(std::string_view result) {
+    constexpr std::string_view kKey = "\"simulated\":";
+    const auto at = result.find(kKey);
+    if (at == std::string_view::npos) return false;
+    result.remove_prefix(at + kKey.size());
+    return result.substr(std::min(result.find_first_not_of(' '), result.size()))
+        .starts_with("true");
+}
+
 void read_head(const File& file, Campaign& to) {
     std::string format;
     try {
@@ -188,7 +198,6 @@ void read_head(const File& file, Campaign& to) {
         throw hdf5::Error(fmt::format("{}: format_version: found {}, expected {}", to.path, version,
                                       kFormatVersion));
     Head& head = to.head;
-    bool says_simulated = true;
     attributes_of(head, [&](const char* name, auto& field) {
         using Field = std::remove_reference_t<decltype(field)>;
         try {
@@ -199,14 +208,11 @@ void read_head(const File& file, Campaign& to) {
             }
         } catch (const hdf5::Error&) {
             if (std::string_view(name) != "simulated") throw;
-            says_simulated = false;
         }
     });
     head.configuration = file.read_text("/configuration");
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
-    if (!says_simulated)  // of vibrigd 0.1.0
-        head.simulated = of_simulated_rig(head.configuration);
     if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
     if (file.has("/proof")) head.proof = file.read_text("/proof");
     try {
@@ -220,6 +226,9 @@ void read_head(const File& file, Campaign& to) {
         to.mark = shown(file.text("/", "mark"));
     }
     if (file.has("/result")) to.result_json = file.read_text("/result");
+    // Recordings of vibrigd 0.1.0 have no attribute; and one that says no is not believed alone.
+    head.simulated =
+        head.simulated || of_simulated_rig(head.configuration) || says_simulated(to.result_json);
 }
 
 }  // namespace

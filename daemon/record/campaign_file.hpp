@@ -127,6 +127,7 @@ struct Recovery {
     std::string cut_dwell;      ///< the dwell that was in progress; empty: none
     std::vector<std::string> words;
     std::vector<std::string> missing_raw;  ///< segments of the raw log that are not there
+    std::string misplaced_raw;             ///< one that does not belong where it is; empty: none
 };
 
 /// Makes the files of a campaign whose writer died readable for every program again, takes what the

@@ -162,6 +162,7 @@ void join(Campaign& to, Campaign part) {
     append(to.conditions, part.conditions);
     append(to.events, part.events);
     append(to.gaps, part.gaps);
+    to.head.simulated = to.head.simulated || part.head.simulated;
     to.state = part.state;
     to.reason = part.reason;
     to.mark = part.mark;

@@ -328,73 +328,33 @@ std::string find_campaign(const std::string& argument, const std::vector<std::st
 
 namespace {
 
-/// What the index beside a campaign's folder has of it; nothing without an index.
-std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
-                                       const Index::Tell& tell) {
-    std::error_code error;
-    const fs::path folder = fs::weakly_canonical(campaign_folder, error);
-    const std::string beside = folder.parent_path().string();
-    if (error || !fs::exists(Index::path_in(beside), error)) return {};
-    try {
-        return Index(beside, tell, Index::Use::ask).files_of(base_name(folder));
-    } catch (const std::exception&) {
-        // Of somebody else: nothing to compare with.
-    }
-    return {};
+/// It begins another life of the daemon, before which UTC may have been set back.
+bool begins_anew(const std::string& path) {
+    RawReader reader(path);
+    std::string begin;
+    for (std::string_view piece; begin.size() < kStartLine.size() && reader.next(piece);)
+        begin += piece;
+    return begin.starts_with(kStartLine);
 }
 
 }  // namespace
 
-void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell) {
-    std::error_code error;
-    const fs::path folder = fs::weakly_canonical(campaign_folder, error);
-    for (const auto& file : indexed_files(campaign_folder, tell)) {
-        const fs::path path = folder / file.name;
-        if (!fs::exists(path, error)) {
-            if (file.part > 0)
-                throw std::runtime_error(fmt::format(
-                    "{}: missing {} of campaign {}, which the index has with {} samples",
-                    campaign_folder, file.name, base_name(folder), file.rows));
-        } else if (file.closed &&
-                   static_cast<std::int64_t>(fs::file_size(path, error)) != file.bytes) {
-            tell(fmt::format("{}: found {} bytes, {} when it was closed: changed since",
-                             path.string(), fs::file_size(path, error), file.bytes));
-        }
-    }
-    for (const auto& words : gone_raw(campaign_folder, tell))
-        tell(campaign_folder + ": missing " + words);
-}
-
-std::vector<std::string> gone_raw(const std::string& campaign_folder, const Index::Tell& tell) {
-    std::map<int, std::string> expected;
-    const auto there = raw_files(campaign_folder);
-    for (int n = there.empty() ? 0 : raw_number(there.back()); n > 0; --n)
-        expected[n] = fmt::format("raw-{:04d}.log", n);
-    for (const auto& file : indexed_files(campaign_folder, tell)) {
-        if (const int n = raw_number(file.name); n > 0)
-            expected[n] = fmt::format("{}, which the index has with {} frames, SHA-256 {}",
-                                      file.name, file.rows, file.sha256);
-    }
-    for (const auto& path : there) expected.erase(raw_number(path));
-    std::vector<std::string> words;
-    for (auto& [number, text] : expected) words.push_back(std::move(text));
-    return words;
-}
-
-std::vector<std::string> cut_raw(const std::string& campaign_folder) {
-    std::vector<std::string> words;
-    // A compressed one has its name once it is whole, also while the campaign is being written.
+std::string misplaced_raw(const std::string& campaign_folder) {
+    // As for whoever reads the frames: a second for time stamps that are not quite in order.
+    constexpr std::int64_t kSecond_ns = 1'000'000'000;
+    std::int64_t last = 0;
     for (const auto& path : raw_files(campaign_folder)) {
-        if (path.ends_with(".zst") && is_cut(path))
-            words.push_back(fmt::format("the end of {}: the file is cut off", base_name(path)));
+        const IndexedFile log = look_at_raw(path);
+        if (log.rows == 0) continue;
+        if (begins_anew(path)) last = 0;
+        if (log.from_utc_ns + kSecond_ns < last)
+            return fmt::format(
+                "{}: found a time {:.2f} s before the end of the log before it, expected logs in "
+                "their order: it is of another campaign, or a copy",
+                path, static_cast<double>(last - log.from_utc_ns) * 1e-9);
+        last = std::max(last, log.to_utc_ns);
     }
-    return words;
-}
-
-std::vector<std::string> missing_raw(const std::string& campaign_folder, const Index::Tell& tell) {
-    auto words = gone_raw(campaign_folder, tell);
-    std::ranges::move(cut_raw(campaign_folder), std::back_inserter(words));
-    return words;
+    return {};
 }
 
 }  // namespace vibrig::record

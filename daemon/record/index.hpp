@@ -90,6 +90,10 @@ class Index {
 /// What the index beside a campaign's folder says of its files: throws if one is not there, tells
 /// if one is not as it was closed. Silent without an index.
 void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell);
+/// In words, the HDF5 files of a campaign whose SHA-256 is not that with which the index beside it
+/// has them as closed. Empty: none, or no index. All of each is read.
+[[nodiscard]] std::vector<std::string> changed_parts(const std::string& campaign_folder,
+                                                     const Index::Tell& tell);
 /// In words, the segments of a campaign's raw log that are not in its folder: by the numbers of
 /// those that are, and by the index beside it. Empty: all are there.
 [[nodiscard]] std::vector<std::string> gone_raw(const std::string& campaign_folder,
@@ -97,7 +101,10 @@ void compare_with_index(const std::string& campaign_folder, const Index::Tell& t
 /// Likewise those that end within a frame. For whoever needs the log: its sizes are read, which
 /// takes a disk's time.
 [[nodiscard]] std::vector<std::string> cut_raw(const std::string& campaign_folder);
-/// Both.
+/// In words, a segment that begins before the end of the one before it: it is of another campaign,
+/// or a copy. Empty: none. All of the log is read.
+[[nodiscard]] std::string misplaced_raw(const std::string& campaign_folder);
+/// Those that are gone, and those that are cut.
 [[nodiscard]] std::vector<std::string> missing_raw(const std::string& campaign_folder,
                                                    const Index::Tell& tell);
 

@@ -166,6 +166,9 @@ Recovery recover_one(const std::string& path) {
 }
 
 Recovery recover_folder(const std::string& folder, const Index::Tell& tell) {
+    if (part_files(folder).empty() && !raw_files(folder).empty())
+        throw std::runtime_error(
+            with_raw_log(folder + ": found no campaign.h5 in it, expected one", folder + "/raw"));
     const std::string path = campaign_path(folder);
     Recovery recovery;
     try {
@@ -175,6 +178,12 @@ Recovery recover_folder(const std::string& folder, const Index::Tell& tell) {
     }
     recovery.path = path;
     recovery.missing_raw = missing_raw(folder_of(path), tell);
+    try {
+        recovery.misplaced_raw = misplaced_raw(folder_of(path));
+    } catch (const std::exception& error) {
+        // One that is cut was named.
+        if (recovery.missing_raw.empty()) recovery.misplaced_raw = error.what();
+    }
     return recovery;
 }
 
@@ -186,8 +195,10 @@ std::vector<Recovery> recover(const std::string& argument, const Index::Tell& te
     const bool is_folder = fs::is_directory(argument, error);
     if (is_folder && part_files(argument).empty()) {
         for (const auto& entry : fs::directory_iterator(argument, error)) {
-            if (!part_files(entry.path().string()).empty())
-                folders.push_back(entry.path().string());
+            const std::string path = entry.path().string();
+            if (!part_files(path).empty() ||
+                (entry.is_directory(error) && !raw_files(path).empty()))
+                folders.push_back(path);
         }
         std::ranges::sort(folders);
     }
@@ -200,7 +211,8 @@ std::vector<Recovery> recover(const std::string& argument, const Index::Tell& te
         } catch (const std::exception& why) {
             if (!all) throw;
             Recovery failed;
-            failed.path = part_files(folder).begin()->second;
+            const auto parts = part_files(folder);
+            failed.path = parts.empty() ? folder : parts.begin()->second;
             failed.failed = why.what();
             done.push_back(std::move(failed));
         }

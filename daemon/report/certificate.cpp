@@ -205,7 +205,8 @@ Json annex_of(const Campaign& campaign, const Json& result, const record::Replay
             {"recording", std::move(files)},
             {"configuration_sha256", record::sha256_of_text(campaign.head.configuration)},
             {"result_sha256", record::sha256_of_text(campaign.result_json)},
-            {"replay", fmt::format("estimates after each of {} dwells as recorded, to the last bit",
+            {"replay", fmt::format("result, and estimates after each of {} dwells, as recorded, to "
+                                   "the last bit",
                                    replayed.compared)},
             {"recorded_by", "vibrigd " + campaign.head.version},
             {"issued_with", std::string("vibrig ") + kVersion}};

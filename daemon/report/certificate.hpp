@@ -36,8 +36,8 @@ class Refused : public std::runtime_error {
 };
 
 /// Content of a calibration certificate by ISO/IEC 17025, 7.8: the fields of HTML, PDF and JSON.
-/// `result`: as vibrig identify prints it. Throws Refused when it is not valid, has no combined
-/// uncertainty, or does not come out of its recording.
+/// `result`: as the replay gives it, in the form of result.json. Throws Refused when it is not
+/// valid, has no combined uncertainty, or does not come out of its recording.
 [[nodiscard]] nlohmann::ordered_json certificate_of(const record::Campaign& campaign,
                                                     const nlohmann::ordered_json& result,
                                                     const record::ReplayResult& replayed,

@@ -84,14 +84,18 @@ Chart uncertainties_chart(const estimator::Result& result, const Assessment& of)
 }
 
 void plot_result(const std::string& path, const estimator::Result& result,
-                 const Assessment& assessed) {
+                 const Assessment& assessed, bool simulated) {
     const auto& p = result.covariance;
     const auto correlation = [&p](std::size_t i, std::size_t j) {
         return p[i][j] / std::sqrt(p[i][i] * p[j][j]);
     };
-    tool::plot::Pictures pictures{{"uncertainties", uncertainties_chart(result, assessed).svg()},
-                                  {"correlation", correlation_chart(correlation).svg()}};
-    if (assessed.done) pictures.emplace_back("residuals", residuals_chart(assessed).svg());
+    const auto drawn = [simulated](Chart chart) {
+        if (simulated) chart.title = "SIMULATED: " + chart.title;
+        return chart.svg();
+    };
+    tool::plot::Pictures pictures{{"uncertainties", drawn(uncertainties_chart(result, assessed))},
+                                  {"correlation", drawn(correlation_chart(correlation))}};
+    if (assessed.done) pictures.emplace_back("residuals", drawn(residuals_chart(assessed)));
     tool::plot::write_pictures(path, pictures);
 }
 

@@ -20,8 +20,9 @@ namespace vibrig::report {
                                                     const estimator::uncertainty::Assessment& of);
 
 /// What `--plot PATH` of a result means: an SVG file, the uncertainties; or a folder, and
-/// correlation and residuals beside them. Throws std::runtime_error naming the path.
+/// correlation and residuals beside them. `simulated`: the rig was a program, which each chart
+/// says. Throws std::runtime_error naming the path.
 void plot_result(const std::string& path, const estimator::Result& result,
-                 const estimator::uncertainty::Assessment& assessed);
+                 const estimator::uncertainty::Assessment& assessed, bool simulated);
 
 }  // namespace vibrig::report

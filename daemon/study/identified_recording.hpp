@@ -15,6 +15,7 @@ struct IdentifiedRecording {
     estimator::Settings settings;
     record::ReplayResult replayed;
     estimator::uncertainty::Assessment assessed;
+    bool simulated = false;  ///< the rig was a program
 };
 /// Throws StudyError if it is not what was planned, else what reading and replaying throw.
 [[nodiscard]] IdentifiedRecording identify_recording(const Recording& recording,

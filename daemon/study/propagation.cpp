@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr char kBlock = 'U';
+constexpr char kBlock = 'U', kSimulatedBlock = 'V';
 constexpr std::uint64_t kFewest = 2;
 // JCGM 101, 8.2: draws that judge a budget are taken to a fifth of its tolerance.
 constexpr double kFiner = 5;
@@ -59,7 +59,7 @@ std::string PropagationWorker::run(std::uint64_t index) {
                       budget.expanded,
                       {c.mean, c.u, c.low, c.high, c.shortest_low, c.shortest_high}};
         }
-        std::string bytes(1 + sizeof out, kBlock);
+        std::string bytes(1 + sizeof out, model_->found.simulated ? kSimulatedBlock : kBlock);
         std::memcpy(bytes.data() + 1, out.data(), sizeof out);
         return bytes;
     });
@@ -68,7 +68,7 @@ std::string PropagationWorker::run(std::uint64_t index) {
 struct PropagationSums::Sums {
     int digits = 1;
     std::uint64_t blocks = 0;
-    bool stable = false;
+    bool stable = false, simulated = false;
     BlockRecord first{};
     std::array<std::array<Sum, kDrawn>, estimator::kParameters> drawn, squares;
     std::map<std::string, std::uint64_t> failures;
@@ -103,10 +103,12 @@ PropagationSums::~PropagationSums() = default;
 
 void PropagationSums::add(const std::string& bytes) {
     Sums& s = *sums_;
-    if (bytes.size() != 1 + sizeof(BlockRecord) || bytes[0] != kBlock) {
+    if (bytes.size() != 1 + sizeof(BlockRecord) ||
+        (bytes[0] != kBlock && bytes[0] != kSimulatedBlock)) {
         ++s.failures[decode(bytes).failed];
         return;
     }
+    s.simulated = s.simulated || bytes[0] == kSimulatedBlock;
     if (s.stable) return;
     BlockRecord block;
     std::memcpy(block.data(), bytes.data() + 1, sizeof block);
@@ -157,6 +159,7 @@ Json PropagationSums::json() const {
     }
     return {{"trials", s.blocks * static_cast<std::uint64_t>(kTrialsOfBlock)},
             {"digits", s.digits},
+            {"simulated", s.simulated},
             {"stable", s.stable},
             {"failures", s.failures},
             {"verdict", !s.stable   ? "not stable yet"

@@ -119,6 +119,7 @@ std::string identified(const Recording& recording, const std::vector<Setting>& s
     const Json out{{"name", found.name},
                    {"serial", found.serial},
                    {"state", found.state},
+                   {"simulated", found.simulated},
                    {"samples", found.replayed.samples},
                    {"old", old_result(found.old_result)},
                    {"new", new_result(found.replayed.result, found.assessed)}};
@@ -185,7 +186,8 @@ IdentifiedRecording identify_recording(const Recording& recording,
                             campaign.result_json,
                             loaded.estimator,
                             record::replay(campaign, loaded.estimator, {}),
-                            {}};
+                            {},
+                            campaign.head.simulated};
     out.assessed = tool::assess(out.settings, out.replayed.found, out.replayed.result,
                                 out.replayed.rows, record::shaken_of(campaign, loaded))
                        .assessed;

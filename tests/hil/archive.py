@@ -24,6 +24,8 @@ import time
 import urllib.error
 import urllib.request
 
+import h5py
+
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import recording_faults  # noqa: E402
 import rig as r  # noqa: E402
@@ -115,9 +117,17 @@ def moves(checks, rig, lab, base):
     events = rig.tool("events").stdout
     checks.check("has moved by more than its" in events and "D_Fx" in events,
                  "a campaign that moves a coefficient by more than its unit's history allows is an alarm", events[-800:])
-    trend = lab.run("trend", "0018", "--json", "--plot", os.path.join(rig.folder, "trend"))
+    trend = lab.run("trend", "0018", "--simulated", "--json", "--plot", os.path.join(rig.folder, "trend"))
     found = json.loads(trend.stdout or '{"campaigns": [], "coefficients": []}')
     checks.equal(len(found["campaigns"]), 13, "vibrig trend has all its campaigns")
+    text = lab.run("trend", "0018", "--simulated").stdout
+    with open(os.path.join(rig.folder, "trend", "D_Fx.svg"), encoding="utf-8") as chart:
+        checks.check(text.startswith("SIMULATED: ") and "SIMULATED: " in chart.read() and found.get("simulated") is True,
+                     "of a simulated rig text, charts and JSON of a trend say so", text[:200])
+    checks.equal(lab.run("trend", "0018").stdout, text, "without a real one they are what there is")
+    since = lab.run("trend", "0018", "--simulated", "--since", "2099-01-01")
+    checks.check(since.returncode == 2 and "found no campaign of unit '0018' since 2099-01-01" in since.stderr, "a day after all of them is named",
+                 since.stderr)
     nobody = lab.run("trend", "")
     checks.check(nobody.returncode == 2 and "SERIAL: found nothing, expected a value" in nobody.stderr, "no serial number is no unit", nobody.stdout + nobody.stderr)
     checks.check(any(c["name"] == "D_Fx" and c["shutdown_instability"]["p"] < 1e-6 for c in found["coefficients"]),
@@ -469,6 +479,27 @@ def only_read(checks, programs, folder, results, serial):
     checks.equal(sorted(c["campaign"] for c in rec.campaigns() or []), sorted(campaigns), "which does make it anew: " + run.stderr)
 
 
+def rivals(checks, programs, folder, base):
+    """A copy of a campaign that is not whole, or says something else, takes no place in the archive."""
+    lab = Archive(programs, os.path.join(folder, "rivals"))
+    checks.check(lab.add(base, "rig-1").returncode == 0, "a campaign is archived")
+    before = lab.campaigns()
+    lied, cut = (os.path.join(folder, name, os.path.basename(base)) for name in ("lied", "cut"))
+    clone(base, lied, 0, shift=100)
+    with h5py.File(os.path.join(lied, "campaign.h5"), "r+") as file:   # a clone's own name is its folder's
+        checks.equal(file.attrs["campaign"].decode(), os.path.basename(base), "its copy is of the same name")
+    shutil.copytree(base, cut)
+    os.remove(os.path.join(cut, "dwells.csv"))
+    for what, copy in (("with another result", lied), ("with a file less", cut)):
+        run = lab.add(copy, "rig-1")
+        there = os.path.join(lab.folder, before[0]["campaign"])
+        checks.check(run.returncode == 2 and copy in run.stderr and there in run.stderr, f"a copy {what} is refused, both are named",
+                     run.stdout + run.stderr)
+    checks.equal(lab.campaigns(), before, "and the genuine one stays what the archive has")
+    checks.equal(lab.verify(), [], "whole")
+    checks.check(lab.add(base, "rig-1").returncode == 0 and lab.campaigns() == before, "delivered again it changes nothing")
+
+
 def full_archive(checks, programs, folder, base):
     disk = recording_faults.SickDisk(folder)
     if disk.refused:
@@ -541,7 +572,7 @@ def shared(checks, programs, folder, base):
                  "each campaign is there once")
     checks.equal(lab.verify(), [], "archive and index agree")
     checks.equal(len(lab.campaigns("--serial", "rig-2-1") or []), 4, "filters work there as in SQLite")
-    trend = lab.run("trend", "rig-1-0", "--json")
+    trend = lab.run("trend", "rig-1-0", "--simulated", "--json")
     checks.check(trend.returncode == 0 and len(json.loads(trend.stdout)["campaigns"]) == 4, "and the trend", trend.stderr)
     server.process.send_signal(signal.SIGSTOP)
     begun = time.monotonic()
@@ -573,6 +604,7 @@ def main():
         os.mkdir(os.path.join(folder, "full"))
         full_archive(checks, programs, os.path.join(folder, "full"), small)
         once(checks, programs, folder, small)
+        rivals(checks, programs, folder, small)
         only_read(checks, programs, folder, rig.results, "0017")
         kills(checks, programs, folder, small, seed)
         grows(checks, programs, folder)

@@ -247,13 +247,6 @@ high = 2.0
         file.write(text)
     issue = ["--paper", paper, "--by", "A. Person", "-o", "C-17"]
     made = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket, "--json")
-    path = str(campaign.parts[0])
-    shutil.copy(path, path + ".kept")
-    result = json.loads(json.dumps(campaign.result))
-    def with_result(value):
-        with h5py.File(path, "r+") as file:
-            del file["result"]
-            file["result"] = np.bytes_(json.dumps(value))
     checks.check(made.returncode == 0, "a certificate is issued", made.stderr)
     pdf, page = os.path.join(rig.folder, "C-17.pdf"), os.path.join(rig.folder, "C-17.html")
     certificate = json.load(open(os.path.join(rig.folder, "C-17.json"), encoding="utf-8"))
@@ -273,28 +266,117 @@ high = 2.0
                  (issued.get("number"), issued.get("in_journal")) == ("C-17", True) and not [name for name in os.listdir(rig.folder) if "unfinished" in name], "which is said, too", made.stdout)
     printed = len(re.findall(rb"/Type */Page\b", open(pdf, "rb").read()))
     checks.check(1 < printed <= 5, "it is a few pages, its budget among them", f"{printed} pages")
-    again = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket, "--json")
+    over = tool(rig, "certificate", str(campaign.folder), *issue, "--no-journal")
+    checks.check(over.returncode == 2 and "found it there already" in over.stderr, "one that was issued is not written over", over.stderr)
+    elsewhere = ["--paper", paper, "--by", "A. Person", "-o", "elsewhere"]
+    again = tool(rig, "certificate", str(campaign.folder), *elsewhere, "--socket", rig.socket, "--json")
     checks.check(again.returncode == 1 and "issued already" in again.stderr and "issued already" in json.loads(again.stdout)["refused"], "a number is given once", again.stderr)
     checks.equal(hashlib.sha256(open(pdf, "rb").read()).hexdigest(), digest, "and the one that has it stays as it is")
-    nobody = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", os.path.join(rig.folder, "nobody"))
+    checks.equal([name for name in os.listdir(rig.folder) if "elsewhere" in name], [], "and of what is refused nothing is left")
+    nobody = tool(rig, "certificate", str(campaign.folder), *elsewhere, "--socket", os.path.join(rig.folder, "nobody"))
     checks.check(nobody.returncode == 2 and "--no-journal" in nobody.stderr, "without its daemon none is issued", nobody.stderr)
     for wrong in ("{}", "text", json.dumps({**entry, "number": "C-18", "pdf_sha256": digest.upper()}), json.dumps({**entry, "number": ""})):
         said = post(rig.socket, {"kind": "certificate", "by": "A", "argument": wrong})
         checks.check(said[0] == 409 and "expected" in said[1] or "no JSON object" in said[1], f"no entry: {wrong[:40]}", str(said))
-    result["verdict"] = {"word": "not valid", "reasons": [{"text": "the fit contradicts"}]}
-    with_result(result)
-    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-journal", "-o", "no")
-    checks.check(no.returncode == 1 and "the fit contradicts" in no.stderr and not os.path.exists(os.path.join(rig.folder, "no.pdf")),
-                 "what is not valid is refused", no.stderr)
-    for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
+    certificate_in_the_way(checks, rig, campaign, paper, text)
+    certificate_of_lies(checks, rig, campaign, paper)
+    for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("C-17", "  "), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
                          (text + "colour = 1\n", "unknown key colour"), (text.replace("high = 2.0", "high = -1"), "low not below high"),
                          (text + text[text.index("[[limit]]"):], '"D_Fx" a second time'), (text + "[item]\nreceived = 9999-11-20\n", "day of issue"),
                          ("number = ", "C-17.toml:1"), (text.replace("[customer]", "[costumer]"), "unknown key costumer")):
         with open(paper, "w", encoding="utf-8") as file:
             file.write(wrong)
-        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-journal")
+        bad = tool(rig, "certificate", str(campaign.folder), *elsewhere, "--no-journal")
         checks.check(bad.returncode == 2 and words in bad.stderr, f"a paper that is wrong is named: {words}", bad.stderr)
+
+
+def certificate_in_the_way(checks, rig, campaign, paper, text):
+    """A name that cannot be had is refused before the journal knows the number, and a number is one with blanks as well."""
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text.replace("C-17", " C-18  "))
+    os.mkdir(os.path.join(rig.folder, "C-18.pdf"))
+    issue = ["certificate", str(campaign.folder), "--paper", paper, "--by", "A. Person", "-o", "C-18", "--socket", rig.socket, "--json"]
+    run = tool(rig, *issue)
+    checks.check(run.returncode == 2 and "C-18.pdf: found it there already" in run.stderr, "a folder of its name is named", run.stderr)
+    os.rmdir(os.path.join(rig.folder, "C-18.pdf"))
+    run = tool(rig, *issue)
+    checks.check(run.returncode == 0 and json.loads(run.stdout)["number"] == "C-18", "and the number is still to be had", run.stderr)
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text.replace("C-17", "C-18 "))
+    run = tool(rig, *issue[:-5], "-o", "other", *issue[-3:])
+    checks.check(run.returncode == 1 and "issued already" in run.stderr, "with a blank more it is the same number", run.stderr)
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def certificate_of_lies(checks, rig, campaign, paper):
+    """What the recording says of itself has to come out of it again."""
+    command = ["--paper", paper, "--by", "A", "--no-journal", "-o", "no"]
+    path = str(campaign.parts[0])
+    shutil.copy(path, path + ".kept")
+    value = campaign.result["parameters"][0]["value"]
+    with open(path, "r+b") as file:
+        content = file.read()
+        at = content.index(b'"value":', content.index(b'{"parameters":[{"name":"D_Fx"')) + len(b'"value":')
+        digit = content.index(b".", at) + 1
+        file.seek(digit)
+        file.write(b"5" if content[digit:digit + 1] != b"5" else b"6")
+    run = tool(rig, "certificate", str(campaign.folder), *command)
+    checks.check(run.returncode == 1 and "campaign.h5: found SHA-256" in run.stderr and "changed since" in run.stderr,
+                 "a byte that was changed since is seen by the index", run.stderr)
+    away = os.path.join(rig.folder, "away", "lied")
+    shutil.copytree(str(campaign.folder), away)
     shutil.move(path + ".kept", path)
+
+    def lied(what, change):
+        """One more lie in the result of the copy, of which there is no index."""
+        with h5py.File(os.path.join(away, "campaign.h5"), "r+") as file:
+            result = json.loads(file["result"][()]) if change else None
+            if change:
+                change(result)
+                del file["result"]
+                file["result"] = np.bytes_(json.dumps(result))
+        run = tool(rig, "certificate", away, *command)
+        checks.check(run.returncode == 1 and f"{away}/campaign.h5: found a result that does not come out of the recording again" in run.stderr and
+                     "json.exception" not in run.stderr, f"no certificate of {what}", run.stderr)
+        run = tool(rig, "replay", away)
+        checks.check(run.returncode == 1 and "the recording's result is not that of its dwells (/result: " in run.stderr and
+                     "last bit" not in run.stderr, f"and a replay says so of {what}", run.stderr)
+    lied("one digit of a coefficient", None)
+    honest = campaign.result
+    for what, change in (("u / 10", lambda r: r["parameters"][3].update(u=honest["parameters"][3]["u"] / 10)),
+                         ("another name", lambda r: r["parameters"][4].update(name="D_Fx")),
+                         ("another unit", lambda r: r["parameters"][4].update(unit="<script>")),
+                         ("another verdict", lambda r: r.update(verdict={"word": "splendid", "reasons": 5})),
+                         ("numbers for coefficients", lambda r: r.update(parameters=[5] * 30)),
+                         ("another spectrum", lambda r: r.update(spectrum={"frequencies": [5], "sweeps": 3}))):
+        lied(what, lambda r, change=change: (r.clear(), r.update(json.loads(json.dumps(honest))), change(r)))
+    checks.equal([name for name in os.listdir(rig.folder) if name.startswith("no.")], [], "and nothing is left of them")
+    checks.check(value is not None, "the coefficient is determined")
+
+
+def check_contradiction(checks, programs, folder):
+    """An accelerometer's zero of 0.015 g that the configuration does not know: whoever looks at the recording says the same."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        rig.start_plant("--seed", "1", "--truth", rig.truth_file({"accelerometer": {"zero_g": [0.015, 0.0, 0.0]}, **r.QUICK}), "--speed", "max")
+        rig.configure({**CAMPAIGN, "name": "crooked", "table_g": [9.0, 0.0]}, unit={"type": "GP-3", "serial": "0017"})
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 30)
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "A. Person")
+        rig.wait_for_state(("finished", "aborted", "tripped"), 120)
+        rig.wait_for(lambda s: not s["recorder"].get("recording"), 30)
+    finally:
+        rig.stop()
+    recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("crooked-"))
+    with open(os.path.join(folder, "paper.toml"), "w", encoding="utf-8") as file:
+        file.write('number = "1"\n[laboratory]\nname = "L"\n[customer]\nname = "C"\n')
+    for command in (("identify", recording), ("replay", recording), ("report", recording, "-o", "r.html"),
+                    ("certificate", recording, "--paper", "paper.toml", "--by", "A", "--no-journal")):
+        run = tool(rig, *command)
+        checks.check(run.returncode == 1 and "not valid, because the configuration does not fit the recording: " in run.stdout + run.stderr,
+                     f"vibrig {command[0]}: a configuration that does not fit is no result", f"status {run.returncode} {(run.stdout + run.stderr)[-600:]}")
 
 
 def main():
@@ -330,6 +412,9 @@ def main():
             check_examples(checks, campaign)
         finally:
             rig.stop()
+        crooked = os.path.join(folder, "crooked")
+        os.mkdir(crooked)
+        check_contradiction(checks, programs, crooked)
     return checks.end()
 
 

@@ -163,7 +163,31 @@ def resumed(checks, rig):
                      f"{command[0]}: a missing part is named", run.stderr)
     os.rename(os.path.join(rig.folder, "aside.h5"), os.path.join(folder, "campaign.h5"))
     played(checks, rig, folder)
+    misplaced_segment(checks, rig, folder)
     missing_segment(checks, rig, folder)
+
+
+def misplaced_segment(checks, rig, folder):
+    """A segment twice: nothing is made of it, and whoever mends the campaign says so."""
+    other = os.path.join(rig.folder, "misplaced")
+    shutil.copytree(folder, other)
+    first, second = r.raw_logs(other)[:2]
+    shutil.copy(first, second)
+    run = offline(rig, "export", other, "--to", "candump", "-o", "misplaced.log")
+    checks.check(run.returncode == 2 and "expected logs in their order" in run.stderr and second in run.stderr and
+                 not os.path.exists(os.path.join(rig.folder, "misplaced.log")), "a segment in another's place is not exported", run.stderr)
+    run = offline(rig, "recover", other)
+    checks.check(run.returncode == 1 and "expected logs in their order" in run.stdout, "and named by recover", run.stdout + run.stderr)
+    # Beside it one of which the raw log alone is left.
+    bare = os.path.join(rig.folder, "bare")
+    os.makedirs(os.path.join(bare, "gone"))
+    shutil.copy(first, os.path.join(bare, "gone"))
+    shutil.copytree(folder, os.path.join(bare, "whole"))
+    run = offline(rig, "recover", bare)
+    checks.check(run.returncode == 1 and f"{bare}/gone: found no campaign.h5 in it" in run.stderr, "a folder without its HDF5 file is named",
+                 run.stdout + run.stderr)
+    for path in (other, bare):
+        shutil.rmtree(path)
 
 
 def missing_segment(checks, rig, folder):
@@ -299,9 +323,11 @@ def studied(checks, rig, folder, anew):
     again, table = study("recordings", f'kind = "recordings"\nfolders = ["{folder}"]\n[identify]\nnoise.resolver_arcsec = 10.0\n')
     checks.equal(again["recordings"][0]["new"]["value"], [p["value"] for p in anew["parameters"]],
                  "a study of recordings gives what replay gives, to the last bit")
+    checks.check("  SIMULATED\n" in table and again["recordings"][0]["simulated"] is True, "and that it was simulated", table)
     checks.check("with noise.resolver_arcsec = 10.0" in table and again["recordings"][0]["old"] is not None,
                  "and says with what, and what the recording said", table)
     proof, table = study("uncertainty", f'kind = "uncertainty"\nrecording = "{folder}"\n')
+    checks.check(table.startswith("SIMULATED: ") and proof["simulated"] is True, "of a simulated rig a proof says so", table[:200])
     checks.check(proof["stable"] and f"the budget is {proof['verdict']}" in table, "a budget is proved or not", table)
     with h5py().File(os.path.join(rig.folder, "recordings.h5")) as first, h5py().File(os.path.join(rig.folder, "uncertainty.h5")) as second:
         checks.equal((first["new"].shape, second["coefficients"].shape), ((1, 30), (30, 12)), "both as tables, too")
@@ -392,6 +418,16 @@ def marked(checks, rig, folder, path, result):
         checks.check("simulated" in first.lower() and (kind == "json") == ('"simulated": true' in first),
                      f"the compensation as {kind} begins with it", made[:200])
     checks.check(offline(rig, "identify", path).stdout.startswith("SIMULATED: "), "identify begins with it")
+    drawn = offline(rig, "identify", path, "--plot", "u.svg")
+    with open(os.path.join(rig.folder, "u.svg"), encoding="utf-8") as chart:
+        checks.check("SIMULATED: " in chart.read(), "and its chart", drawn.stderr)
+    unsaid = os.path.join(rig.folder, "unsaid.h5")
+    shutil.copy(path, unsaid)
+    with h5py().File(unsaid, "r+") as file:
+        file.attrs.modify("simulated", 0)
+    checks.check(offline(rig, "replay", unsaid).stdout.startswith("SIMULATED: "), "an attribute that denies it is not believed alone")
+    budget = offline(rig, "uncertainty", path)
+    checks.check(budget.stdout.startswith("SIMULATED: ") or "no two dwells" in budget.stderr, "the budget begins with it", budget.stdout[:200])
     with open(os.path.join(rig.folder, "x.csv"), encoding="ascii") as file:
         lines = file.read().splitlines()
     checks.check(lines[0].endswith(",simulated") and all(line.endswith(",1") for line in lines[1:]),
@@ -416,6 +452,10 @@ def kept(checks, rig, folder):
             if run.returncode != 2 or "found a file of a recording" not in run.stderr:
                 checks.check(False, f"{' '.join(command)} -o {name}: refused", f"status {run.returncode} {run.stderr}")
                 return
+    for name in ("raw-0099.log", "archive.json", "campaign-9.h5"):
+        run = offline(rig, "export", folder, "--to", "candump", "-o", os.path.join(folder, name))
+        checks.check(run.returncode == 2 and "found the name of a recording's file" in run.stderr and
+                     not os.path.exists(os.path.join(folder, name)), f"nor is {name} put among them", run.stderr)
     after = [os.stat(name) for name in names]
     checks.check([(a.st_size, a.st_mtime_ns) for a in before[:3]] == [(a.st_size, a.st_mtime_ns) for a in after[:3]],
                  "files of the recording are not written over")

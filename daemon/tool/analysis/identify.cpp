@@ -38,7 +38,8 @@ int run(const IdentifyOptions& options) {
     const Identified identified = identify_recording(options.recording, options.config, request);
     const auto& assessed = identified.assessed;
     const auto* spectrum = identified.spectrum ? &*identified.spectrum : nullptr;
-    if (!options.plot.empty()) report::plot_result(options.plot, identified.result, assessed);
+    if (!options.plot.empty())
+        report::plot_result(options.plot, identified.result, assessed, identified.simulated);
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;

@@ -53,4 +53,13 @@ std::string RigDoubts::tell(estimator::Result& result,
     return found.contradictions.front();
 }
 
+void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction) {
+    if (contradiction.empty()) return;
+    using estimator::uncertainty::Level;
+    const std::string text = "the configuration does not fit the recording: " + contradiction;
+    verdict.level = Level::not_valid;
+    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
+    verdict.sentence = "not valid, because " + text;
+}
+
 }  // namespace vibrig::tool

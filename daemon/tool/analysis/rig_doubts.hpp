@@ -5,6 +5,7 @@
 
 #include "estimator/commissioning/consistency.hpp"
 #include "estimator/identification/result.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::tool {
 
@@ -25,5 +26,9 @@ class RigDoubts {
     estimator::Settings settings_;
     std::vector<estimator::commissioning::DwellMeans> dwells_;
 };
+
+/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
+/// `contradiction`: as tell() has it; empty changes nothing.
+void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction);
 
 }  // namespace vibrig::tool

@@ -10,6 +10,7 @@
 #include "daemon/tool/analysis/uncertainty_text.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "proto/json_text.hpp"
 
 namespace vibrig::tool {
@@ -54,7 +55,9 @@ std::string budget_json(const Identified& of, std::optional<std::size_t> only,
                                number_or_null(drawn->coefficients[i].high)};
         list.push_back(std::move(one));
     }
-    Json out{{"coefficients", std::move(list)}, {"leverage", leverage_json(of.assessed)}};
+    Json out{{"simulated", of.simulated},
+             {"coefficients", std::move(list)},
+             {"leverage", leverage_json(of.assessed)}};
     out.update(root);
     if (drawn != nullptr) out["monte_carlo"] = monte_carlo_json(*drawn);
     return proto::json_text(out) + "\n";
@@ -70,9 +73,10 @@ std::size_t coefficient_number(const std::string& name) {
 
 /// Of each coefficient the parts, squared, over u squared. All of them and the correlations, which
 /// may be below 0, are 1.
-void draw_budget(const uncertainty::Assessment& assessed, const std::string& path) {
-    plot::Chart chart{"Parts of the combined uncertainty", plot::Axis("coefficient, as listed"),
-                      plot::Axis("part of u squared")};
+void draw_budget(const uncertainty::Assessment& assessed, bool simulated, const std::string& path) {
+    plot::Chart chart{
+        std::string(simulated ? "SIMULATED: " : "") + "Parts of the combined uncertainty",
+        plot::Axis("coefficient, as listed"), plot::Axis("part of u squared")};
     chart.y.include(0);
     chart.y.include(1);
     for (const uncertainty::Leverage& of : uncertainty::leverages(assessed)) {
@@ -113,10 +117,11 @@ int run(const UncertaintyOptions& options) {
     std::optional<uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
-    if (!options.plot.empty()) draw_budget(assessed, options.plot);
-    std::cout << (options.json ? budget_json(identified, only, check)
-                               : budget_table(assessed, only) +
-                                     (check != nullptr ? monte_carlo_text(*check) : ""));
+    if (!options.plot.empty()) draw_budget(assessed, identified.simulated, options.plot);
+    std::cout << (options.json
+                      ? budget_json(identified, only, check)
+                      : simulated_line(identified.simulated) + budget_table(assessed, only) +
+                            (check != nullptr ? monte_carlo_text(*check) : ""));
     return exit_status(assessed.verdict.level, options.strict);
 }
 

@@ -5,6 +5,7 @@
 #include "daemon/record/hdf5.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/study_output.hpp"
+#include "daemon/tool/simulated.hpp"
 
 namespace vibrig::tool::studies {
 
@@ -19,7 +20,8 @@ constexpr std::array kPropagated{"/value",      "/gum/u",      "/gum/low",     "
 }  // namespace
 
 std::string propagation_table(const Json& result) {
-    std::string out = done_text(result, "blocks");
+    std::string out =
+        simulated_line(result.value("simulated", false)) + done_text(result, "blocks");
     for (const auto& [why, count] : result.at("failures").items())
         out += "failed " + std::to_string(count.get<long>()) + " times: " + why + "\n";
     for (const auto& [key, value] : result.at("settings").items())

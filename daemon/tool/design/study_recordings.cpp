@@ -41,20 +41,24 @@ std::size_t place_of(const std::string& coefficient) {
     return 0;
 }
 
+std::string mark_of(const Json& one) { return one.value("simulated", false) ? "  SIMULATED" : ""; }
+
 std::string row(const Json& one) {
     const std::string words = word_of(one.at("old")) + " -> " + word_of(one.at("new"));
     if (!one.at("coefficient").is_string()) {
         return line(
-            "%-28s %-10s %-22s %s", name_of(one).c_str(),
+            "%-28s %-10s %-22s %s%s", name_of(one).c_str(),
             one.at("serial").get<std::string>().c_str(), words.c_str(),
-            one.at("old").is_object() ? "no coefficient in both" : "the recording has no result");
+            one.at("old").is_object() ? "no coefficient in both" : "the recording has no result",
+            mark_of(one).c_str());
     }
     const std::string coefficient = one.at("coefficient");
     const std::size_t i = place_of(coefficient);
-    return line("%-28s %-10s %-22s %-6s %12.6f %12.6f %10.3g %8.3f", name_of(one).c_str(),
+    return line("%-28s %-10s %-22s %-6s %12.6f %12.6f %10.3g %8.3f%s", name_of(one).c_str(),
                 one.at("serial").get<std::string>().c_str(), words.c_str(), coefficient.c_str(),
                 entry(one, "old", "value", i), entry(one, "new", "value", i),
-                value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i)));
+                value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i)),
+                mark_of(one).c_str());
 }
 
 std::string csv_text(const std::string& text) {

@@ -103,6 +103,9 @@ int add(const AddOptions& o) {
                     filter.until_utc_ns = delivery.entry.started_utc_ns;
                     history = archive::Index(at.place.index, archive::Database::Mode::read)
                                   .results(filter);
+                    std::erase_if(history, [&](const archive::Entry& one) {
+                        return one.simulated != delivery.entry.simulated;
+                    });
                 }
                 // Archived as it is, so that vibrigd does not try for ever.
                 static_cast<void>(tell_missing_raw(folder));

@@ -14,6 +14,7 @@
 #include "daemon/serve/api.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/json_text.hpp"
 #include "proto/text.hpp"
@@ -119,6 +120,12 @@ std::vector<archive::Entry> of_unit(archive::Index& index, const std::string& se
     return index.results(filter);
 }
 
+/// Of those on real rigs; where there are none, of the simulated ones, which say so.
+archive::Trend unit_trend(std::vector<archive::Entry> campaigns) {
+    const bool simulated = std::ranges::all_of(campaigns, &archive::Entry::simulated);
+    return archive::trend_of(std::move(campaigns), archive::kShutdownAfterH, simulated);
+}
+
 serve::Document chart(const archive::Trend& trend, std::string_view name) {
     for (const auto& of : trend.coefficients)
         if (estimator::parameter_names()[of.position] == name)
@@ -151,7 +158,7 @@ std::string ArchivePages::front(archive::Index& index) const {
 
 std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) const {
     const std::string& serial = campaigns.front().unit_serial;
-    const auto trend = archive::trend_of(campaigns, archive::kShutdownAfterH);
+    const auto trend = unit_trend(campaigns);
     std::string rows, charts, outliers;
     for (const auto& of : trend.coefficients) {
         const std::string name = estimator::parameter_names()[of.position];
@@ -175,9 +182,14 @@ std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) con
     }
     return page(
         "Unit " + serial,
-        (outliers.empty() ? "" : "<h2>Outliers</h2><ul>" + outliers + "</ul>") +
+        (trend.simulated ? "<p><b>" + std::string(kSimulatedRig) + "</b></p>" : "") +
+            (outliers.empty() ? "" : "<h2>Outliers</h2><ul>" + outliers + "</ul>") +
             "<h2>Coefficients</h2><p class=\"note\">A pause of more than 4 h is a shutdown; "
-            "p is of the F test without the instability.</p><div class=\"scroll\"><table "
+            "p is of the F test without the instability." +
+            (trend.elsewhere > 0
+                 ? " " + std::to_string(trend.elsewhere) + " campaigns on simulated rigs left out."
+                 : "") +
+            "</p><div class=\"scroll\"><table "
             "id=\"trend\"><thead><tr><th></th><th class=\"number\">mean</th><th "
             "class=\"number\">95 %</th><th class=\"number\">operating instability</th><th "
             "class=\"number\">p</th><th class=\"number\">shutdown instability</th><th "
@@ -258,7 +270,7 @@ serve::Document ArchivePages::answer(std::string_view path, std::string_view que
             serial && !serial->empty() ? of_unit(index, *serial) : std::vector<archive::Entry>{};
         if (campaigns.empty()) return {404, "", "no such unit in the archive"};
         if (path == "/unit") return {200, "text/html; charset=utf-8", unit(campaigns)};
-        const auto trend = archive::trend_of(std::move(campaigns), archive::kShutdownAfterH);
+        const auto trend = unit_trend(std::move(campaigns));
         if (path == "/chart") return chart(trend, serve::query_value(query, "coefficient"));
         return {200, "application/json",
                 proto::json_text(trend_json(*serial, trend, archive::kShutdownAfterH))};

@@ -2,7 +2,6 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -16,14 +15,18 @@
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/record/shaken.hpp"
 #include "daemon/report/analysis.hpp"
 #include "daemon/report/certificate.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/results/result_difference.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/certificate_files.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
+#include "daemon/tool/recordings/replayed_result.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
@@ -33,10 +36,7 @@ namespace vibrig::tool {
 
 namespace {
 
-namespace fs = std::filesystem;
 using report::Issue;
-
-constexpr std::array kKinds{".html", ".json", ".pdf"};
 
 struct CertificateArguments {
     std::string campaign, paper, output = "certificate", by;
@@ -133,6 +133,14 @@ std::vector<report::Limit> limits_of(const std::string& file, const toml::node* 
     return all;
 }
 
+/// Two numbers that differ in blanks alone read the same on paper.
+std::string trimmed(const std::string& text) {
+    constexpr const char* kBlank = " \t\r\n\v\f";
+    const auto begin = text.find_first_not_of(kBlank);
+    if (begin == std::string::npos) return {};
+    return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
 /// Of what is issued at that time.
 Issue read_paper(const std::string& file, std::int64_t utc_ns) {
     std::ifstream in(file);
@@ -151,7 +159,7 @@ Issue read_paper(const std::string& file, std::int64_t utc_ns) {
                          {"number", "guard_band", "laboratory", "customer", "item", "limit"});
     Issue issue;
     issue.utc_ns = utc_ns;
-    issue.number = top.text("number");
+    issue.number = trimmed(top.text("number"));
     if (issue.number.empty())
         throw std::runtime_error(file + ": number: found nothing, expected the certificate's");
     issue.guard_band = top.number("guard_band").value_or(1);
@@ -190,11 +198,11 @@ Issue read_paper(const std::string& file, std::int64_t utc_ns) {
 /// What the rig's daemon is asked to keep in its signed journal, which nobody else writes. Returns
 /// why it refuses; empty: number and hashes are on disk.
 std::string enter_in_journal(const CertificateArguments& arguments, const Issue& issue,
-                             const std::string& campaign, const std::string& unfinished) {
+                             const std::string& campaign, const CertificateFiles& files) {
     const nlohmann::json entry{{"number", issue.number},
                                {"campaign", campaign},
-                               {"pdf_sha256", record::sha256_of_file(unfinished + ".pdf")},
-                               {"json_sha256", record::sha256_of_file(unfinished + ".json")}};
+                               {"pdf_sha256", record::sha256_of_file(files.path(".pdf"))},
+                               {"json_sha256", record::sha256_of_file(files.path(".json"))}};
     const nlohmann::json command{
         {"kind", "certificate"}, {"by", issue.by}, {"argument", entry.dump()}};
     serve::Client client(arguments.at);
@@ -245,46 +253,72 @@ void say_issued(const CertificateArguments& arguments, const std::string& number
               << (arguments.no_journal ? ", in no journal" : ", in the rig's journal") << std::endl;
 }
 
-int certify(const CertificateArguments& arguments) {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    Issue issue = read_paper(arguments.paper,
-                             std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-    issue.by = arguments.by;
-    for (const char* kind : kKinds) proto::check_output(arguments.output + kind);
-    if (!arguments.no_journal) look_for_daemon(arguments);
-    const auto campaign = read_named_campaign(arguments.campaign);
-    const auto result = nlohmann::ordered_json::parse(campaign.result_json, nullptr, false);
+/// Of what the replay gives, which the recording's own result has to be. Throws report::Refused.
+nlohmann::ordered_json certificate_for(const record::Campaign& campaign, const Issue& issue) {
+    const auto tell = [](const std::string& words) { std::cerr << words << '\n'; };
+    for (const auto& words : record::changed_parts(campaign.folder, tell))
+        throw report::Refused(words);
+    const auto rig = report::configuration_of(campaign);
     record::ReplayResult replayed;
     {
         Progress progress("replaying " + campaign.head.name);
         record::ReplayOptions options;
         options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
-        replayed = record::replay(campaign, report::rig_of(campaign).estimator, options);
+        replayed = record::replay(campaign, rig.estimator, options);
     }
+    Assessed found = assess(rig.estimator, replayed.found, replayed.result, replayed.rows,
+                            record::shaken_of(campaign, rig));
+    const std::string text = replayed_json(replayed, found, rig.estimator, campaign.head.simulated);
+    auto certificate =
+        report::certificate_of(campaign, nlohmann::ordered_json::parse(text), replayed, issue);
+    const std::string difference = result_difference(campaign.result_json, text);
+    if (!difference.empty())
+        throw report::Refused(campaign.path +
+                              ": found a result that does not come out of the recording again, "
+                              "expected every number of it: " +
+                              difference);
+    const std::string contradiction =
+        doubt_replayed(campaign, rig.estimator, replayed, found.assessed.verdict);
+    if (!contradiction.empty())
+        throw report::Refused(campaign.path + ": found a result that is " +
+                              found.assessed.verdict.sentence + ", expected a valid one");
+    return certificate;
+}
+
+int certify(const CertificateArguments& arguments) {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    Issue issue = read_paper(arguments.paper,
+                             std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+    issue.by = arguments.by;
+    CertificateFiles files(arguments.output);
+    if (!arguments.no_journal) look_for_daemon(arguments);
+    const auto campaign = read_named_campaign(arguments.campaign);
     nlohmann::ordered_json certificate;
     try {
-        certificate = report::certificate_of(
-            campaign, result.is_object() ? result : nlohmann::ordered_json::object(), replayed,
-            issue);
+        certificate = certificate_for(campaign, issue);
     } catch (const report::Refused& why) {
         return refused(arguments, why.what());
     }
-    // They have their names once the journal knows them.
-    const std::string unfinished = arguments.output + ".unfinished";
-    proto::write_output(unfinished + ".json", proto::json_text(certificate, 2) + "\n");
-    proto::write_output(unfinished + ".html", report::certificate_page(certificate));
-    print_pdf(unfinished + ".html", unfinished + ".pdf");
-    const std::string no =
-        arguments.no_journal
-            ? ""
-            : enter_in_journal(arguments, issue, campaign.head.campaign, unfinished);
-    for (const char* kind : kKinds) {
-        if (no.empty())
-            fs::rename(unfinished + kind, arguments.output + kind);
-        else
-            fs::remove(unfinished + kind);
+    proto::write_output(files.path(".json"), proto::json_text(certificate, 2) + "\n");
+    proto::write_output(files.path(".html"), report::certificate_page(certificate));
+    print_pdf(files.path(".html"), files.path(".pdf"));
+    files.take_names();
+    if (!arguments.no_journal) {
+        files.keep(true);
+        std::string no;
+        try {
+            no = enter_in_journal(arguments, issue, campaign.head.campaign, files);
+        } catch (const std::exception& error) {
+            throw std::runtime_error(std::string(error.what()) +
+                                     "; whether the journal has it is not known, " +
+                                     files.whereabouts());
+        }
+        if (!no.empty()) {
+            files.keep(false);
+            return refused(arguments, no);
+        }
     }
-    if (!no.empty()) return refused(arguments, no);
+    files.issue();
     say_issued(arguments, issue.number, certificate["verdict"]["word"]);
     return 0;
 }

@@ -25,6 +25,7 @@
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "daemon/tool/analysis/swept_dwells.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/replayed_result.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/spectrum/sampling.hpp"
@@ -454,21 +455,15 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     if (campaign.found) anew.emplace(settings, *campaign.found, dwells.size());
     estimator::Identification as_recorded(settings, dwells.size());
     auto& identification = anew ? anew->identification() : as_recorded;
-    RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
-    for (const auto& dwell : dwells) {
-        doubts.begin_dwell();
+    for (const auto& dwell : dwells)
         record::feed(identification, campaign, dwell,
-                     [&](std::size_t sample, const estimator::StepResult&) {
-                         if (!dwell.order->sweep.any())
-                             doubts.add(rt::measurement_of(campaign.samples[sample],
-                                                           dwell.order->from, dwell.order->zero_g));
+                     [&](std::size_t, const estimator::StepResult&) {
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
-    }
-    Found found =
-        with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
+    Found found = with_doubts(anew ? anew->result() : identification.result(),
+                              identification.rows(), doubts_of(campaign, settings));
     record::qualify(campaign, dwells.size(), found.result);
     found.rows = identification.rows();
     return found;
@@ -492,16 +487,6 @@ Found identify_campaign(const std::string& path, const std::string& config,
     Found found = identify(campaign, settings);
     found.shaken = record::shaken_of(campaign, rig);
     return found;
-}
-
-/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
-void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction) {
-    if (contradiction.empty()) return;
-    using estimator::uncertainty::Level;
-    const std::string text = "the configuration does not fit the recording: " + contradiction;
-    verdict.level = Level::not_valid;
-    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
-    verdict.sentence = "not valid, because " + text;
 }
 
 /// A folder, an HDF5 file, or the name of a campaign: then there is no such file.

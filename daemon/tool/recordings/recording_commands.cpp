@@ -13,6 +13,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/report/paperwork.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
@@ -121,6 +122,8 @@ bool export_candump(const record::Campaign& campaign, const std::string& path, b
     if (files.empty())
         throw std::runtime_error(campaign.folder +
                                  ": found no raw-*.log, expected the campaign's raw log");
+    if (const auto words = record::misplaced_raw(campaign.folder); !words.empty())
+        throw std::runtime_error(words);
     std::optional<proto::OutputFile> out;
     if (path != "-") out.emplace(path);
     const auto close = [](std::FILE* file) { std::fclose(file); };
@@ -219,6 +222,7 @@ nlohmann::ordered_json recovery_json(const record::Recovery& found) {
     if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
     root["raw_beyond_s"] = found.raw_until_s;
     root["missing_raw"] = found.missing_raw;
+    root["misplaced_raw"] = text_or_null(found.misplaced_raw);
     root["lost"] = lost(found);
     return root;
 }
@@ -236,6 +240,7 @@ std::string recovery_text(const record::Recovery& found) {
     }
     for (const auto& words : lost(found)) text += "lost: " + words + "\n";
     for (const auto& words : found.missing_raw) text += "missing " + words + "\n";
+    if (!found.misplaced_raw.empty()) text += found.misplaced_raw + "\n";
     return text;
 }
 
@@ -250,7 +255,9 @@ int recover(const RecoverOptions& options) {
                         [](const std::string& words) { std::cerr << words << '\n'; });
     int code = 0;
     for (const auto& campaign : found) {
-        if (!campaign.missing_raw.empty() || !campaign.failed.empty()) code = kNo;
+        if (!campaign.missing_raw.empty() || !campaign.misplaced_raw.empty() ||
+            !campaign.failed.empty())
+            code = kNo;
         if (options.json) {
             std::cout << proto::json_text(recovery_json(campaign)) << '\n';
         } else if (campaign.failed.empty()) {
@@ -302,8 +309,9 @@ void add_recordings(CLI::App& app, int& exit_code) {
     recovering.footer(
         "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
         "A file that was closed in order is left as it is.\n"
-        "Exit codes: 0, 1 a segment of the raw log is missing or one of several campaigns cannot "
-        "be\nrecovered, 2 bad usage or input.");
+        "Exit codes: 0, 1 a segment of the raw log is missing or in another's place, or one of "
+        "several "
+        "campaigns\ncannot be recovered, 2 bad usage or input.");
 }
 
 }  // namespace vibrig::tool

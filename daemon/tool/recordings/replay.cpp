@@ -13,13 +13,14 @@
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/results/exit_status.hpp"
+#include "daemon/results/json_values.hpp"
 #include "daemon/results/progress.hpp"
-#include "daemon/results/result_json.hpp"
 #include "daemon/results/result_table.hpp"
 #include "daemon/results/spectrum_text.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/replayed_result.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "proto/candump.hpp"
@@ -112,43 +113,62 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
 }
 
 /// The result; where it is not the recording's, with a word about that.
-std::string replayed_json(const record::ReplayResult& replayed, const Assessed& found,
-                          const estimator::Settings& settings, bool simulated, bool same_build) {
-    std::optional<dwells::Live> live;
-    if (replayed.found)
-        live = {*replayed.found, replayed.live,
-                estimator::uncertainty::assess(settings, replayed.live)};
-    std::string text =
-        result_json(replayed.result, found.assessed, simulated, nullptr, live ? &*live : nullptr,
-                    found.spectrum ? &*found.spectrum : nullptr);
-    if (replayed.different == 0) return text;
-    const nlohmann::ordered_json replay{{"dwells", replayed.compared},
-                                        {"not_as_recorded", replayed.different},
-                                        {"first", replayed.first_difference},
-                                        {"same_build", same_build}};
+std::string printed_json(const record::ReplayResult& replayed, std::string text,
+                         const std::string& difference, bool same_build) {
+    if (replayed.different == 0 && difference.empty()) return text;
+    nlohmann::ordered_json replay{{"dwells", replayed.compared},
+                                  {"not_as_recorded", replayed.different},
+                                  {"first", replayed.first_difference},
+                                  {"result", text_or_null(difference)},
+                                  {"same_build", same_build}};
     text.back() = ',';
     return text + "\"replay\":" + proto::json_text(replay) + "}";
 }
 
+std::string builds(const record::Head& recorded, bool same_build) {
+    return "recorded by " + recorded.version + ", " + recorded.compiler + ", " +
+           recorded.instruction_set + "; this is " + VIBRIG_VERSION + ", " +
+           std::string(estimator::compiler()) + ", " + std::string(estimator::instruction_set()) +
+           (same_build ? ": expected the same\n" : "\n");
+}
+
+/// `difference`: of the recording's result.
 void say_how_it_went(const record::ReplayResult& replayed, const record::Head& recorded,
-                     bool same_build) {
+                     const std::string& difference, bool same_build) {
     std::cerr << line("%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
                       replayed.samples, replayed.dwells.size(), replayed.recorded_s,
                       replayed.took_s,
                       replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
-    if (replayed.compared > 0) {
-        if (replayed.different == 0) {
-            std::cerr << "estimates after each of " << replayed.compared
-                      << " dwells: as recorded, to the last bit\n";
-        } else {
-            std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
-                      << " dwells are not as recorded (" << replayed.first_difference
-                      << "); recorded by " << recorded.version << ", " << recorded.compiler << ", "
-                      << recorded.instruction_set << "; this is " << VIBRIG_VERSION << ", "
-                      << estimator::compiler() << ", " << estimator::instruction_set()
-                      << (same_build ? ": expected the same\n" : "\n");
-        }
+    if (replayed.compared == 0) return;
+    if (replayed.different != 0) {
+        std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
+                  << " dwells are not as recorded (" << replayed.first_difference << "); "
+                  << builds(recorded, same_build);
+    } else if (!difference.empty()) {
+        std::cerr << "the recording's result is not that of its dwells (" << difference << "); "
+                  << builds(recorded, same_build);
+    } else {
+        std::cerr << "estimates after each of " << replayed.compared
+                  << " dwells: as recorded, to the last bit\n";
     }
+}
+
+/// False: of the frames something is missing, which is said.
+bool is_whole(const std::vector<std::string>& files, const std::string& campaign_folder) {
+    bool whole = true;
+    if (std::ranges::none_of(files, is_log)) {
+        // Its samples are those of the HDF5 files. What is gone of the frames was named when the
+        // campaign was read; a file that is cut there may not be the only one.
+        for (const auto& words : record::cut_raw(campaign_folder)) {
+            std::cerr << campaign_folder << ": missing " << words << '\n';
+            whole = false;
+        }
+    } else if (std::ranges::all_of(files, record::raw_number)) {  // others are anybody's
+        const std::string folder = record::folder_of(files.front());
+        whole = tell_missing_raw(folder);
+        whole = tell_left_out(folder, files) && whole;
+    }
+    return whole;
 }
 
 int replay(const ReplayArguments& arguments) {
@@ -170,38 +190,32 @@ int replay(const ReplayArguments& arguments) {
         options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
         replayed = record::replay(campaign, settings, options);
     }
-    // Logs of other names are anybody's.
-    const auto& files = arguments.files;
-    bool whole = true;
-    if (std::ranges::none_of(files, is_log)) {
-        // Its samples are those of the HDF5 files. What is gone of the frames was named when the
-        // campaign was read; a file that is cut there may not be the only one.
-        for (const auto& words : record::cut_raw(campaign.folder)) {
-            std::cerr << campaign.folder << ": missing " << words << '\n';
-            whole = false;
-        }
-    } else if (std::ranges::all_of(files, record::raw_number)) {
-        const std::string folder = record::folder_of(files.front());
-        whole = tell_missing_raw(folder);
-        whole = tell_left_out(folder, files) && whole;
-    }
+    const bool whole = is_whole(arguments.files, campaign.folder);
     if (!arguments.config.empty()) replayed.different = replayed.compared = 0;
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
                             campaign.head.instruction_set == estimator::instruction_set();
-    const auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
-                              record::shaken_of(campaign, rig));
+    auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
+                        record::shaken_of(campaign, rig));
+    // Of other settings, and where the dwells differ, it is another anyway.
+    const std::string difference = arguments.config.empty() && replayed.different == 0
+                                       ? not_as_recorded(campaign, replayed, found, settings)
+                                       : "";
     const auto& assessed = found.assessed;
+    doubt_replayed(campaign, settings, replayed, found.assessed.verdict);
     const bool simulated = campaign.head.simulated;
-    if (!arguments.plot.empty()) report::plot_result(arguments.plot, replayed.result, assessed);
+    if (!arguments.plot.empty())
+        report::plot_result(arguments.plot, replayed.result, assessed, simulated);
     std::cout << (arguments.json
-                      ? replayed_json(replayed, found, settings, simulated, same_build) + "\n"
+                      ? printed_json(replayed, replayed_json(replayed, found, settings, simulated),
+                                     difference, same_build) +
+                            "\n"
                       : simulated_line(simulated) + result_table(replayed.result, assessed) +
                             (found.spectrum ? spectrum_text(*found.spectrum) : ""))
               << std::flush;
-    say_how_it_went(replayed, campaign.head, same_build);
+    say_how_it_went(replayed, campaign.head, difference, same_build);
     if (!std::cout) throw std::runtime_error("standard output: cannot be written");
-    const bool as_recorded = replayed.different == 0 || !same_build;
+    const bool as_recorded = (replayed.different == 0 && difference.empty()) || !same_build;
     return whole && as_recorded ? exit_status(assessed.verdict.level, arguments.strict) : kNo;
 }
 
@@ -242,8 +256,8 @@ void add_replay(CLI::App& app, int& exit_code) {
         "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
         "doubtful), a segment of the raw log is\nmissing or was not given, or the recording's "
         "build and instruction "
-        "set give other estimates (then "
-        "\"replay\" in\nthe JSON), 2 bad usage or input.");
+        "set give other estimates or\nanother result (then \"replay\" in the JSON), 2 bad usage "
+        "or input.");
 }
 
 }  // namespace vibrig::tool

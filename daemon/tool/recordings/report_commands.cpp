@@ -26,6 +26,7 @@
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
+#include "daemon/tool/recordings/replayed_result.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
@@ -74,7 +75,7 @@ void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
     now.rig = before.empty() ? "" : before.back().rig;
     archive::take_result(campaign.result_json, now);
     const auto moved = archive::moved(now, before);
-    const auto trend = archive::trend_of(before, archive::kShutdownAfterH);
+    const auto trend = archive::trend_of(before, archive::kShutdownAfterH, now.simulated);
     analysis.history_note =
         "Unit " + serial + ": " + std::to_string(trend.campaigns.size()) +
         " earlier campaigns in the archive." +
@@ -114,6 +115,7 @@ int make_report(const ReportArguments& arguments) {
             progress.show(static_cast<std::size_t>(100 * fraction), 100);
         });
     }
+    doubt_replayed(campaign, rig.estimator, analysis.replayed, analysis.assessed.verdict);
     try {
         add_history(campaign, arguments.archive, analysis);
     } catch (const std::exception& error) {

@@ -16,7 +16,7 @@ namespace {
 struct TrendOptions {
     std::string serial, since, plot;
     double shutdown_after_h = archive::kShutdownAfterH;
-    bool json = false;
+    bool simulated = false, json = false;
     ArchiveOptions where = {};
 };
 
@@ -42,8 +42,24 @@ int trend(const TrendOptions& o) {
     filter.serial = o.serial;
     if (!o.since.empty()) filter.since_utc_ns = utc_of("--since", o.since);
     auto campaigns = index->results(filter);
+    if (campaigns.empty() && !o.since.empty()) {
+        filter.since_utc_ns = 0;
+        if (const auto before = index->results(filter); !before.empty())
+            throw std::runtime_error(index->name() + ": found no campaign of unit '" +
+                                     proto::printable(o.serial) + "' since " + o.since +
+                                     ", expected one: its newest is of " +
+                                     minute_text(before.back().started_utc_ns));
+    }
     if (campaigns.empty()) unknown_unit(*index, o.serial);
-    const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h);
+    // Simulated ones are no history of a unit that was on a real rig.
+    const bool simulated =
+        o.simulated || std::ranges::all_of(campaigns, &archive::Entry::simulated);
+    const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h, simulated);
+    if (found.campaigns.empty() && found.left_out == 0)
+        throw std::runtime_error(index->name() + ": found " + std::to_string(found.elsewhere) +
+                                 " campaigns of unit '" + proto::printable(o.serial) +
+                                 "' on real rigs, expected one on a simulated rig: without "
+                                 "--simulated");
     if (o.json) {
         std::cout << proto::json_text(trend_json(o.serial, found, o.shutdown_after_h)) << '\n';
     } else {
@@ -67,6 +83,8 @@ void add_trend(CLI::App& app, int& exit_code) {
     add_number(command, "--shutdown-after", options.shutdown_after_h,
                "a longer pause between two campaigns counts as a shutdown, h", 0, 1e6)
         ->capture_default_str();
+    command.add_flag("--simulated", options.simulated,
+                     "of campaigns on simulated rigs (default: on real ones, where there are any)");
     command.add_flag("--json", options.json, "print it as JSON");
     command
         .add_option("--plot", options.plot,

@@ -6,6 +6,7 @@
 #include "daemon/results/json_values.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {
@@ -36,6 +37,9 @@ double days_of(const archive::Trend& trend, const archive::TrendPoint& point) {
                                trend.campaigns.front().started_utc_ns) /
            kDay_ns;
 }
+
+/// In a chart's title.
+std::string mark_of(const archive::Trend& trend) { return trend.simulated ? "SIMULATED: " : ""; }
 
 std::string time_axis(const archive::Trend& trend) {
     return "days since " + iso_text(trend.campaigns.front().started_utc_ns);
@@ -87,9 +91,11 @@ Json trend_json(const std::string& serial, const archive::Trend& trend, double s
     }
     const std::string type = trend.campaigns.empty() ? "" : trend.campaigns.back().unit_type;
     return {{"unit", {{"type", text_or_null(type)}, {"serial", serial}}},
+            {"simulated", trend.simulated},
             {"shutdown_after_h", shutdown_after_h},
             {"campaigns", std::move(campaigns)},
             {"left_out", trend.left_out},
+            {"on_other_rigs", trend.elsewhere},
             {"coefficients", std::move(coefficients)},
             {"outliers", std::move(outliers)}};
 }
@@ -98,10 +104,14 @@ std::string trend_table(const std::string& serial, const archive::Trend& trend,
                         double shutdown_after_h) {
     const std::size_t turns = trend.turn.empty() ? 0 : trend.turn.back() + 1;
     std::string text =
+        simulated_line(trend.simulated) +
         printed("unit %s: %zu campaigns in %zu turn-ons (a pause of more than %g h is a shutdown)",
                 serial.c_str(), trend.campaigns.size(), turns, shutdown_after_h);
     if (trend.left_out > 0)
         text += "; " + std::to_string(trend.left_out) + " not valid or without a result left out";
+    if (trend.elsewhere > 0)
+        text += "; " + std::to_string(trend.elsewhere) +
+                (trend.simulated ? " on real rigs" : " on simulated rigs") + " left out";
     text +=
         "\n\ncoefficient        mean   95 % interval             operating     shutdown       "
         "newest"
@@ -129,7 +139,7 @@ std::string trend_table(const std::string& serial, const archive::Trend& trend,
 
 std::string trend_chart(const archive::Trend& trend, const archive::CoefficientTrend& of) {
     const std::string name = estimator::parameter_names()[of.position];
-    plot::Chart chart{name + " over the campaigns", plot::Axis(time_axis(trend)),
+    plot::Chart chart{mark_of(trend) + name + " over the campaigns", plot::Axis(time_axis(trend)),
                       plot::Axis(name + ", " + estimator::parameter_unit(of.position))};
     plot::Curve usual{.name = "value with U", .look = plot::Look::dots};
     plot::Curve outlying{.name = "outlier", .look = plot::Look::dots};
@@ -148,8 +158,8 @@ std::string trend_chart(const archive::Trend& trend, const archive::CoefficientT
 }
 
 void plot_trend(const std::string& serial, const archive::Trend& trend, const std::string& path) {
-    plot::Chart chart{"unit " + serial + ": all coefficients", plot::Axis(time_axis(trend)),
-                      plot::Axis("(value - mean) / u")};
+    plot::Chart chart{mark_of(trend) + "unit " + serial + ": all coefficients",
+                      plot::Axis(time_axis(trend)), plot::Axis("(value - mean) / u")};
     for (const auto& of : trend.coefficients) {
         plot::Curve curve;
         for (const auto& point : of.points) {

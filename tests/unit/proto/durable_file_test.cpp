@@ -155,6 +155,12 @@ TEST_F(DurableFile, RecordingsAndInputsAreNoOutputs) {
         if (!fs::exists(folder / name)) put(name, "");
         EXPECT_THAT(refused(folder / name), HasSubstr("found a file of a recording")) << name;
     }
+    // AND names that a new file would be taken for
+    for (const char* const name :
+         {"raw-0009.log", "campaign-2.h5", "archive.json", "j.sqlite3-wal"}) {
+        EXPECT_THAT(refused(folder / name), HasSubstr("found the name of a recording's file"));
+        EXPECT_FALSE(fs::exists(folder / name)) << name;
+    }
     EXPECT_EQ(refused(folder / "report.html"), "");
     // GIVEN an input, by another name
     put("rec.csv", "rows");

@@ -257,6 +257,24 @@ TEST_F(ArchiveIndex, ACampaignThatWentOnTakesThePlaceOfItsFirstPart) {
     Filter all;
     all.superseded = true;
     EXPECT_EQ(index.campaigns(all).size(), 2U);
+    index.put(first, true);
+    EXPECT_THAT(keys(index.results({})), ElementsAre(whole.key));
+    EXPECT_THAT(index.rivals_of(whole), IsEmpty());
+}
+
+TEST_F(ArchiveIndex, AnotherCopyOfTheSameEndIsARivalAndTakesNoPlace) {
+    Index index(path_, Database::Mode::write);
+    const Entry genuine = entry_of("17", 1);
+    index.put(genuine, true);
+    Entry other = genuine;
+    other.key += "~2";
+    other.hash = "another";
+    EXPECT_THAT(index.rivals_of(other), ElementsAre(genuine.key));
+    EXPECT_THAT(index.rivals_of(genuine), IsEmpty()) << "the same recording";
+    index.put(other, true);
+    EXPECT_EQ(index.results({}).size(), 2U) << "the genuine one stays";
+    other.rig = "other";
+    EXPECT_THAT(index.rivals_of(other), IsEmpty());
 }
 
 TEST_F(ArchiveIndex, ADamagedCopyIsNamedAsWhatItIs) {

@@ -80,9 +80,9 @@ TEST(Trend, PausesAreShutdowns) {
     std::vector<Entry> campaigns{entry_of("1", 0), entry_of("1", 0), entry_of("1", 1)};
     campaigns[1].started_utc_ns = campaigns[0].ended_utc_ns + kHour_ns;
     campaigns[1].ended_utc_ns = campaigns[1].started_utc_ns + kHour_ns;
-    const auto found = trend_of(campaigns, kShutdownAfterH);
+    const auto found = trend_of(campaigns, kShutdownAfterH, false);
     EXPECT_THAT(found.turn, ::testing::ElementsAre(0, 0, 1));
-    EXPECT_THAT(trend_of(campaigns, 0.5).turn, ::testing::ElementsAre(0, 1, 2));
+    EXPECT_THAT(trend_of(campaigns, 0.5, false).turn, ::testing::ElementsAre(0, 1, 2));
 }
 
 TEST(Trend, NamesTheCampaignThatDoesNotFit) {
@@ -96,12 +96,33 @@ TEST(Trend, NamesTheCampaignThatDoesNotFit) {
     campaigns[7].coefficients[13]->value += 30 * kU;
     campaigns.push_back(entry_of("1", 12));
     campaigns.back().verdict = "not valid";
-    const auto found = trend_of(campaigns, kShutdownAfterH);
+    const auto found = trend_of(campaigns, kShutdownAfterH, false);
     EXPECT_EQ(found.left_out, 1U);
     for (const auto& of : found.coefficients)
         for (const auto& point : of.points)
             EXPECT_EQ(point.outlier, of.position == 13 && point.campaign == 7)
                 << of.position << " " << point.campaign << ", seed " << kSeed;
+}
+
+TEST(Trend, SimulatedCampaignsAreNoHistoryOfARealUnit) {
+    std::vector<Entry> campaigns;
+    for (int i = 0; i < 5; ++i) {
+        campaigns.push_back(entry_of("1", i, i < 3 ? 1 : 100));
+        campaigns.back().simulated = i >= 3;
+    }
+    campaigns[1].verdict = "not valid";
+    const auto real = trend_of(campaigns, kShutdownAfterH, false);
+    EXPECT_FALSE(real.simulated);
+    EXPECT_EQ(real.campaigns.size(), 2U);
+    EXPECT_EQ(real.left_out, 1U);
+    EXPECT_EQ(real.elsewhere, 2U);
+    EXPECT_NEAR(real.coefficients.at(0).mean, 1, 1e-12);
+    const auto simulated = trend_of(campaigns, kShutdownAfterH, true);
+    EXPECT_TRUE(simulated.simulated);
+    EXPECT_EQ(simulated.campaigns.size(), 2U);
+    EXPECT_EQ(simulated.left_out, 0U);
+    EXPECT_EQ(simulated.elsewhere, 3U);
+    EXPECT_NEAR(simulated.coefficients.at(0).mean, 100, 1e-12);
 }
 
 /// A unit's life: a campaign a day, its coefficients scattered by `instability`.

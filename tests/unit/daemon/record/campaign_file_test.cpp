@@ -187,5 +187,26 @@ TEST_F(Recording, ThatIsNoneIsRefusedByName) {
     }
 }
 
+TEST_F(Recording, IsSimulatedIfAnythingInItSaysSo) {
+    const auto read = [this](bool attribute, const std::string& configuration,
+                             const std::string& result) {
+        const std::string path = (folder_ / "campaign.h5").string();
+        fs::remove(path);
+        Head written = head();
+        written.simulated = attribute;
+        written.configuration += configuration;
+        CampaignWriter writer(path, written);
+        for (const auto& sample : samples(5, 0)) writer.put(sample);
+        writer.end({"finished", "", "", result, head().utc_ns});
+        return read_campaign(path).head.simulated;
+    };
+    EXPECT_FALSE(read(false, "", R"({"nis":1,"simulated":false})"));
+    EXPECT_FALSE(read(false, "clock.source = \"real\"\n", "{}"));
+    EXPECT_TRUE(read(true, "", R"({"nis":1,"simulated":false})"));
+    EXPECT_TRUE(read(false, "clock.source = \"rig\"\n", "{}"));
+    EXPECT_TRUE(read(false, "", R"({"nis":1,"simulated":true})"));
+    EXPECT_TRUE(read(false, "", R"({"simulated": true, "nis": 1})"));
+}
+
 }  // namespace
 }  // namespace vibrig::record

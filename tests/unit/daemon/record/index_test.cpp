@@ -11,6 +11,7 @@
 
 #include "daemon/journal/database.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/record/raw_log.hpp"
 #include "tests/unit/daemon/record/parts.hpp"
 
 namespace vibrig::record {
@@ -107,6 +108,37 @@ TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
     // WHEN the last part is gone, THEN the index knows it
     fs::remove(folder_ / "campaign-2.h5");
     EXPECT_THROW(compare_with_index(folder_.string(), tell), std::runtime_error);
+}
+
+TEST_F(Parts, ARawLogThatBeginsBeforeTheEndOfTheOneBeforeItIsNamed) {
+    const auto put = [this](int number, const std::string& text) {
+        std::ofstream(folder_ / ("raw-000" + std::to_string(number) + ".log")) << text;
+    };
+    const auto frames = [](int from_s, int to_s) {
+        std::string text;
+        for (int s = from_s; s <= to_s; ++s)
+            text += "(" + std::to_string(1'700'000'000 + s) + ".000000) vcan0 123#00 R\n";
+        return text;
+    };
+    EXPECT_EQ(misplaced_raw(folder_.string()), "");
+    put(1, frames(0, 50));
+    put(2, frames(50, 100));  // at the same time: stamps are not quite in order
+    put(3, "");
+    put(4, frames(100, 150));
+    EXPECT_EQ(misplaced_raw(folder_.string()), "");
+    // A copy of another one, or of another campaign.
+    put(4, frames(0, 50));
+    EXPECT_NE(misplaced_raw(folder_.string()).find("raw-0004.log: found a time 100.00 s before"),
+              std::string::npos)
+        << misplaced_raw(folder_.string());
+    put(4, frames(100, 150));
+    put(2, frames(150, 200));
+    EXPECT_NE(misplaced_raw(folder_.string()).find("raw-0004.log: found a time 100.00 s before"),
+              std::string::npos)
+        << misplaced_raw(folder_.string());
+    // After a start UTC may have been set back.
+    put(4, std::string(kStartLine) + "\n" + frames(100, 150));
+    EXPECT_EQ(misplaced_raw(folder_.string()), "");
 }
 
 TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {

@@ -41,5 +41,36 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     EXPECT_EQ(file(path), bytes);
 }
 
+TEST_F(Recording, WithoutItsHdf5FileIsNamed) {
+    // GIVEN a campaign, and a folder of which the raw log alone is left
+    const fs::path one = folder_ / "one", gone = folder_ / "gone";
+    for (const auto& path : {one, gone}) fs::create_directories(path);
+    {
+        CampaignWriter writer((one / "campaign.h5").string(), head());
+        for (const auto& sample : samples(500, 0)) writer.put(sample);
+        writer.end({"finished", "", "", "{}", head().utc_ns});
+    }
+    std::ofstream(gone / "raw-0001.log") << "(1767225600.000000) vcan0 123#00 R\n";
+    std::ofstream(gone / "dwells.csv") << "\n";
+    fs::create_directories(folder_ / "of nobody");
+    // WHEN all are mended, THEN it is named as one that cannot be
+    const auto found = recover(folder_.string(), [](const std::string&) {});
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_EQ(found[0].path, gone.string());
+    EXPECT_NE(found[0].failed.find("gone: found no campaign.h5 in it"), std::string::npos)
+        << found[0].failed;
+    EXPECT_NE(found[0].failed.find("vibrig replay " + gone.string() + "/raw-*"), std::string::npos)
+        << found[0].failed;
+    EXPECT_EQ(found[1].failed, "");
+    EXPECT_THROW(static_cast<void>(recover(gone.string(), {})), std::runtime_error);
+    // AND a log in another's place is named of the whole one
+    for (const char* name : {"raw-0001.log", "raw-0002.log"})
+        std::ofstream(one / name) << "(1767225600.000000) vcan0 123#00 R\n"
+                                     "(1767225660.000000) vcan0 123#00 R\n";
+    EXPECT_NE(
+        recover(one.string(), {}).at(0).misplaced_raw.find("raw-0002.log: found a time 60.00"),
+        std::string::npos);
+}
+
 }  // namespace
 }  // namespace vibrig::record

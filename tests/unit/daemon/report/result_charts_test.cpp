@@ -50,19 +50,22 @@ class PlotOfAResult : public ::testing::Test {
 };
 
 TEST_F(PlotOfAResult, IsOneFileOrAFolderOfThem) {
-    plot_result((folder_ / "one.svg").string(), result_, assessed_);
+    plot_result((folder_ / "one.svg").string(), result_, assessed_, false);
     const std::string svg = text_of(folder_ / "one.svg");
     EXPECT_THAT(svg, HasSubstr("combined, u"));
     EXPECT_THAT(svg, HasSubstr("doubtful, because of the moon"));
-    plot_result((folder_ / "all").string(), result_, assessed_);
+    EXPECT_THAT(svg, ::testing::Not(HasSubstr("SIMULATED")));
+    plot_result((folder_ / "all").string(), result_, assessed_, true);
     for (const char* name : {"uncertainties.svg", "correlation.svg", "residuals.svg"})
-        EXPECT_THAT(text_of(folder_ / "all" / name), HasSubstr("</svg>")) << name;
+        EXPECT_THAT(text_of(folder_ / "all" / name),
+                    ::testing::AllOf(HasSubstr("</svg>"), HasSubstr("SIMULATED: ")))
+            << name;
 }
 
 TEST_F(PlotOfAResult, NamesAPathThatCannotBeWritten) {
     const std::string path = (folder_ / "none" / "one.svg").string();
     try {
-        plot_result(path, result_, assessed_);
+        plot_result(path, result_, assessed_, false);
         FAIL() << "wrote it";
     } catch (const std::runtime_error& error) {
         EXPECT_THAT(error.what(), HasSubstr(path));
@@ -76,7 +79,7 @@ TEST_F(PlotOfAResult, LeavesAHoleForWhatIsNotDetermined) {
     for (auto& row : result_.covariance) row[4] = std::nan("");
     assessed_ = {};
     // WHEN it is drawn THEN nothing in the picture is no number
-    plot_result((folder_ / "all").string(), result_, assessed_);
+    plot_result((folder_ / "all").string(), result_, assessed_, false);
     for (const char* name : {"uncertainties.svg", "correlation.svg"})
         EXPECT_EQ(text_of(folder_ / "all" / name).find("nan"), std::string::npos) << name;
     EXPECT_FALSE(fs::exists(folder_ / "all" / "residuals.svg"));
