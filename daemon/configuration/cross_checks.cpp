@@ -59,6 +59,21 @@ void CrossCheck::everywhere() {
     registers();
 }
 
+void CrossCheck::temperature() {
+    const auto& of = c_.campaign;
+    const std::string window = plain(of.temperature_window_s);
+    if (sound({"campaign.temperature_window_s", "campaign.ready_timeout_s"}) &&
+        of.temperature_window_s >= of.ready_timeout_s)
+        refuse(
+            {"campaign.temperature_window_s", "campaign.ready_timeout_s"},
+            "temperature_window_s " + window + " with ready_timeout_s " + plain(of.ready_timeout_s),
+            "a window shorter than the timeout");
+    if (sound({"campaign.temperature_window_s", "can.signals.temperature"}) &&
+        of.temperature_window_s > 0 && c_.assembler.bindings.temperature.empty())
+        refuse({"campaign.temperature_window_s"}, window + " with no can.signals.temperature",
+               "0 where no temperature is known");
+}
+
 void CrossCheck::for_daemon() {
     rig_clock();
     simulated_rig();
@@ -96,19 +111,7 @@ void CrossCheck::for_daemon() {
     if (sound({"shaker.transport", "shaker.unit"}) && serial && c_.shaker.unit > 247) {
         refuse({"shaker.unit"}, std::to_string(c_.shaker.unit), "1 to 247 on a serial line");
     }
-    if (sound({"campaign.temperature_window_s", "campaign.ready_timeout_s"}) &&
-        c_.campaign.temperature_window_s >= c_.campaign.ready_timeout_s) {
-        refuse({"campaign.temperature_window_s", "campaign.ready_timeout_s"},
-               "temperature_window_s " + plain(c_.campaign.temperature_window_s) +
-                   " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
-               "a window shorter than the timeout");
-    }
-    if (sound({"campaign.temperature_window_s", "can.signals.temperature"}) &&
-        c_.campaign.temperature_window_s > 0 && c_.assembler.bindings.temperature.empty()) {
-        refuse({"campaign.temperature_window_s"},
-               plain(c_.campaign.temperature_window_s) + " with no can.signals.temperature",
-               "0 where no temperature is known");
-    }
+    temperature();
     doors();
     broker();
     onlookers();

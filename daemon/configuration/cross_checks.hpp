@@ -33,6 +33,7 @@ class CrossCheck {
     void broker();
     void onlookers();
     void archiving();
+    void temperature();
     void doors();
     void status_signals();
     void rest();

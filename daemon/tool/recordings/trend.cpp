@@ -1,4 +1,5 @@
 // vibrig trend: a unit's coefficients over its campaigns.
+#include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
 

@@ -52,7 +52,7 @@ struct CampaignTest : testing::Test {
     FakeAccelerometers accelerometers;
     bool disobeyed = false;
     int uncommanded = 0, gimbals_led = 0, gimbals_silent = 0;
-    bool gimbal_status = true;      ///< it comes
+    bool gimbal_status = true;  ///< it comes
     bool temperature_comes = true;
     bool starts_by_itself = false;  ///< the table, in this test
     Proving proving = Proving::nothing;
