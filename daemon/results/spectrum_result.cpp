@@ -108,6 +108,25 @@ void doubt(uncertainty::Assessment& assessed, const std::string& text,
     uncertainty::conclude(assessed, assessed.verdict);
 }
 
+/// Of coefficients that the dwells at the reference frequency leave open: which all of them do not.
+void tell_determined(const Analysis& of, const estimator::Settings& settings,
+                     uncertainty::Assessment& to) {
+    constexpr double kDetermined = 0.25;  // of the prior's variance, as the filter has it
+    const estimator::ParameterArray prior = estimator::prior_sigma(settings);
+    std::string names;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t internal = estimator::internal_of(i);
+        const auto a = static_cast<Index>(internal);
+        const bool open = !std::isfinite(to.coefficients[i].value);
+        if (open && of.covariance_a(a, a) < kDetermined * prior[internal] * prior[internal])
+            names += std::string(" ") + estimator::parameter_names()[i];
+    }
+    for (uncertainty::Reason& reason : to.verdict.reasons)
+        if (reason.code == "not observable" && !names.empty())
+            reason.text += " at the reference frequency; all frequencies together determine" +
+                           names + ", see the result's \"spectrum\"";
+}
+
 /// Number, from 1, that a dwell of the reference frequency has among all of them.
 int among_all(int number, const std::vector<uncertainty::DwellRate>& own,
               const std::vector<uncertainty::DwellRate>& all) {
@@ -214,6 +233,7 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
     // It grows with the frequency.
     uncertainty::take_sync(spectrum.table.rows(), assessed);
     tell_coefficients(spectrum, settings.uncertainty, assessed);
+    tell_determined(of, settings, assessed);
     take_rates(spectrum, assessed);
     auto& reasons = assessed.verdict.reasons;
     std::erase_if(reasons, [](const auto& reason) { return reason.code == "sync motion"; });

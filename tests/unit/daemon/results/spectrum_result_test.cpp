@@ -148,6 +148,22 @@ TEST(AssessOverFrequency, WhatIsFreedIsNotFreedThereAndTheVerdictSaysSo) {
     EXPECT_THAT(words_of(found), HasSubstr("over frequency nothing is freed"));
 }
 
+TEST(AssessOverFrequency, WhatAllFrequenciesDetermineIsSaid) {
+    // GIVEN coefficients that the first frequency alone does not determine
+    const std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    estimator::Settings settings = gain_declared();
+    settings.frequency_hz = 15;
+    estimator::Result result;
+    result.rows = estimator::without_apart(rows);
+    result.observable.fill(true);
+    result.observable[0] = result.observable[4] = false;
+    const Assessed found = assess(settings, {}, result, rows, {});
+    EXPECT_THAT(
+        words_of(found),
+        HasSubstr("do not determine one by one D_Fx D_IIx at the reference frequency; all "
+                  "frequencies together determine D_Fx D_IIx, see the result's \"spectrum\""));
+}
+
 TEST(AssessOverFrequency, MoreDwellsThanItTakesAreSaid) {
     // GIVEN 441 dwells at seven frequencies
     const std::vector<DwellRow> rows = rows_of({}, 7);
