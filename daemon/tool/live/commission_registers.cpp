@@ -28,6 +28,8 @@ using RegisterJson = nlohmann::ordered_json;
 
 constexpr std::size_t kWordsAtOnce = 16;
 constexpr auto kBetweenRequests = std::chrono::milliseconds(200);
+constexpr auto kLate = std::chrono::seconds(1);
+constexpr int kMostAsked = 3;
 constexpr int kValues = 3;
 
 drivers::ShakerSettings settings_of(const RegisterOptions& options) {
@@ -73,16 +75,24 @@ class ReadingLink {
         return {};
     }
 
-    /// Up to the first one that the device refuses.
+    /// Up to the first one that the device refuses. A reply that is late or lost is asked for
+    /// again: a person's answers hang on it, and to read does nothing.
     commission::RegisterBlock read(proto::RegisterTable table, int count) {
         commission::RegisterBlock block{table, {}};
         while (block.words.size() < static_cast<std::size_t>(count)) {
             std::array<std::uint16_t, kWordsAtOnce> words{};
             const auto left = static_cast<std::size_t>(count) - block.words.size();
             const std::span some(words.data(), std::min(left, words.size()));
-            std::this_thread::sleep_for(kBetweenRequests);
-            const auto reply =
-                link_.read(table, static_cast<std::uint16_t>(block.words.size()), some);
+            drivers::Reply reply;
+            for (int asked = 0; asked < kMostAsked; ++asked) {
+                std::this_thread::sleep_for(kBetweenRequests);
+                reply = link_.read(table, static_cast<std::uint16_t>(block.words.size()), some);
+                if (reply.ok() || reply.kind == drivers::ReplyKind::exception) break;
+                // A late reply would be taken for the next one: it is waited for, and forgotten.
+                std::this_thread::sleep_for(kLate);
+                link_.close();
+                open();
+            }
             if (reply.kind == drivers::ReplyKind::exception) break;
             if (!reply.ok())
                 throw std::runtime_error(link_.name() + ": register " +
