@@ -252,10 +252,16 @@ def shakes(checks, rig, what):
         rig.tool("abort", "--by", "tester")
     status = rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") == 0 and
                           not s["shaker"].get("running", True), 30)
-    if status["campaign"]["state"] == "tripped":
-        rig.acknowledge()
-    said = [rig.arm().stderr, rig.tool("start", "--by", "tester").stderr]
-    status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
+    for tries_left in (1, 0):
+        if status["campaign"]["state"] == "tripped":
+            rig.acknowledge()
+        said = [rig.arm().stderr, rig.tool("start", "--by", "tester").stderr]
+        status = rig.wait_for(lambda s: s["campaign"]["state"] in ("recording", "tripped"), 60)
+        # A rig that has to wait for a processor does not shake as it is told to, and the daemon stops it.
+        if status is None or status["campaign"]["state"] != "tripped" or not tries_left:
+            break
+        checks.note(f"{what}: once more: {r.state_of(status)}")
+        rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 30)
     checks.check(status is not None and status["campaign"]["state"] == "recording", f"{what}: the table shakes",
                  f"{r.state_of(status)} {said}")
 
@@ -335,7 +341,9 @@ def upgrades(checks, rig, package):
     status, said = output("dpkg", "-i", package, timeout=120)
     checks.check(status == 0 and "takes the new one at its next rest" in said,
                  "the package upgrades while the daemon is armed, and says that it is not restarted", said)
-    checks.equal((int(prop("MainPID")), rig.status()["campaign"]["state"]), (pid, "armed"), "it goes on, armed")
+    still = rig.wait_for(lambda s: s["campaign"]["state"] == "armed", 10)
+    checks.check(int(prop("MainPID")) == pid and still is not None and still["campaign"]["state"] == "armed", "it goes on, armed",
+                 f"{prop('MainPID')} {r.state_of(still)}")
     rig.tool("start", "--by", "tester")
     moves = ("slewing", "ramping", "settling", "recording", "resting")
     status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
