@@ -692,9 +692,9 @@ def each_key_is_caught_twice(checks, u, text):
         forge(u, key)
         u.restart()
         u.rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 60)
-        if u.rig.tool("arm", "--by", "Ada").returncode:
+        if u.rig.arm("Ada").returncode:
             proof = u.rig.tool("selftest", "--by", "Ada", timeout=120)   # it stands on some of the keys
-            armed = u.rig.tool("arm", "--by", "Ada")
+            armed = u.rig.arm("Ada")
             checks.check(armed.returncode == 0, f"{key} is wrong and the record forged: it is armed",
                          proof.stdout + proof.stderr + armed.stderr)
         u.rig.tool("start", "--by", "Ada")

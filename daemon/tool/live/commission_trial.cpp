@@ -1,5 +1,6 @@
 // The registers that a configuration states, tried on the controller: the only command that writes
 // to a shaker beside the daemon, and never while one has the rig.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <iostream>
@@ -43,7 +44,9 @@ void end_in_order() {
 
 class LinkPort : public commission::TrialPort {
   public:
-    explicit LinkPort(const drivers::ShakerSettings& settings) : link_(settings) { open(); }
+    explicit LinkPort(const drivers::ShakerSettings& settings) : link_(patient(settings)) {
+        open();
+    }
 
     Answer read(proto::RegisterTable table, std::uint16_t address,
                 std::span<std::uint16_t> words) override {
@@ -71,6 +74,11 @@ class LinkPort : public commission::TrialPort {
     [[nodiscard]] const std::string& name() const { return link_.name(); }
 
   private:
+    /// The configured timeout is for a daemon's stops; a person's trial bears a late reply.
+    static drivers::ShakerSettings patient(drivers::ShakerSettings settings) {
+        settings.response_timeout = std::max(settings.response_timeout, 2 * drivers::kSecond);
+        return settings;
+    }
     void open() {
         std::string why;
         if (link_.connect(why) != drivers::ModbusLink::Connection::open)
