@@ -340,7 +340,7 @@ def upgrades(checks, rig, package):
     stays(checks, rig, pid, "armed")
     status, said = output("dpkg", "-i", package, timeout=120)
     checks.check(status == 0 and "takes the new one at its next rest" in said,
-                 "the package upgrades while the daemon is armed, and says that it is not restarted", said)
+                 "the package upgrades while the daemon is armed, and says that it is not restarted", journal()[-2500:] + said[-1000:])
     still = rig.wait_for(lambda s: s["campaign"]["state"] == "armed", 10)
     checks.check(int(prop("MainPID")) == pid and still is not None and still["campaign"]["state"] == "armed", "it goes on, armed",
                  f"{prop('MainPID')} {r.state_of(still)}")
