@@ -322,11 +322,9 @@ Delivery deliver(const std::string& campaign_folder, const Place& place, const s
         entry.key = within.string();
         delivery.kind = Delivery::Kind::was_there;
         delivery.folder = own.string();
-        refuse_rival(place, root, own.string(), entry);
-    } else {
-        refuse_rival(place, root, own.string(), entry);
-        bring(own, root, place, delivery, progress);
     }
+    refuse_rival(place, root, own.string(), entry);
+    if (!inside) bring(own, root, place, delivery, progress);
     note(place, root, inside, delivery);
     return delivery;
 }

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 #include <sstream>
@@ -174,14 +175,10 @@ void read_conditions(const File& file, Campaign& to) {
     to.conditions = rows_of(file, "/conditions", like);
 }
 
-/// A result, without parsing all of it.
-bool says_simulated(std::string_view result) {
-    constexpr std::string_view kKey = "\"simulated\":";
-    const auto at = result.find(kKey);
-    if (at == std::string_view::npos) return false;
-    result.remove_prefix(at + kKey.size());
-    return result.substr(std::min(result.find_first_not_of(' '), result.size()))
-        .starts_with("true");
+bool says_simulated(const std::string& result) {
+    const auto root = nlohmann::json::parse(result, nullptr, false);
+    const auto found = root.is_object() ? root.find("simulated") : root.end();
+    return found != root.end() && *found == true;
 }
 
 void read_head(const File& file, Campaign& to) {

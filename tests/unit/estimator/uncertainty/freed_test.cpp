@@ -149,6 +149,9 @@ TEST_F(Freed, RatesThatNoUnknownExplainsAreNotValid) {
     for (DwellRow& row : rows) row.rate[0] *= 1e6;
     settings.free = {Misfit::cross_axis, Misfit::encoder_zero};
     const Assessment a = assess(settings, estimator::testing::result_of(rows));
+    EXPECT_FALSE(a.freed_settled);
+    EXPECT_NE(std::ranges::find(a.verdict.reasons, "freed", &Reason::code),
+              a.verdict.reasons.end());
     EXPECT_EQ(a.verdict.level, Level::not_valid) << a.verdict.sentence;
 }
 
