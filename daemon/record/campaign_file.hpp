@@ -57,6 +57,8 @@ struct RecordedDwell {
 /// "campaign.h5", "campaign-2.h5" ...
 [[nodiscard]] std::string part_name(int part);
 [[nodiscard]] std::string folder_of(const std::string& path);
+/// The last name of a path, that of a folder with a slash behind it too.
+[[nodiscard]] std::string base_name(const std::string& path);
 /// The files in a folder that are called so, by their numbers.
 [[nodiscard]] std::map<int, std::string> part_files(const std::string& folder);
 /// The first file that CAMPAIGN names: itself, or campaign.h5 in that folder (or in its only

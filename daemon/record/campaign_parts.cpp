@@ -26,6 +26,11 @@ std::string folder_of(const std::string& path) {
     return folder.empty() ? "." : folder;
 }
 
+std::string base_name(const std::string& path) {
+    const fs::path of = path;
+    return (of.has_filename() ? of : of.parent_path()).filename().string();
+}
+
 std::map<int, std::string> part_files(const std::string& folder) {
     std::map<int, std::string> parts;
     std::error_code error;

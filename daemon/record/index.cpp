@@ -38,10 +38,6 @@ CREATE INDEX IF NOT EXISTS campaign_by_name ON campaign (name);
 CREATE INDEX IF NOT EXISTS campaign_by_begin ON campaign (started_utc_ns);
 COMMIT)";
 
-std::string base_name(const fs::path& path) {
-    return (path.has_filename() ? path : path.parent_path()).filename().string();
-}
-
 IndexedFile look_at_part(const std::string& path, Campaign& head) {
     head = read_part_head(path);
     IndexedFile file;

@@ -16,12 +16,6 @@ namespace vibrig::record {
 namespace fs = std::filesystem;
 
 namespace {
-std::string name_of_path(const fs::path& path) {
-    return (path.has_filename() ? path : path.parent_path()).filename().string();
-}
-}  // namespace
-
-namespace {
 
 /// What the index beside a campaign's folder has of it; nothing without an index.
 std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
@@ -31,7 +25,7 @@ std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
     const std::string beside = folder.parent_path().string();
     if (error || !fs::exists(Index::path_in(beside), error)) return {};
     try {
-        return Index(beside, tell, Index::Use::ask).files_of(name_of_path(folder));
+        return Index(beside, tell, Index::Use::ask).files_of(base_name(folder));
     } catch (const std::exception&) {
         // Of somebody else: nothing to compare with.
     }
@@ -49,7 +43,7 @@ void compare_with_index(const std::string& campaign_folder, const Index::Tell& t
             if (file.part > 0)
                 throw std::runtime_error(fmt::format(
                     "{}: missing {} of campaign {}, which the index has with {} samples",
-                    campaign_folder, file.name, name_of_path(folder), file.rows));
+                    campaign_folder, file.name, base_name(folder), file.rows));
         } else if (file.closed &&
                    static_cast<std::int64_t>(fs::file_size(path, error)) != file.bytes) {
             tell(fmt::format("{}: found {} bytes, {} when it was closed: changed since",
@@ -98,7 +92,7 @@ std::vector<std::string> cut_raw(const std::string& campaign_folder) {
     // A compressed one has its name once it is whole, also while the campaign is being written.
     for (const auto& path : raw_files(campaign_folder)) {
         if (path.ends_with(".zst") && is_cut(path))
-            words.push_back(fmt::format("the end of {}: the file is cut off", name_of_path(path)));
+            words.push_back(fmt::format("the end of {}: the file is cut off", base_name(path)));
     }
     return words;
 }
