@@ -311,14 +311,35 @@ def start_campaign(checks, rig, what):
     checks.check(started.returncode == 0, what, armed.stderr + started.stderr + rig.logs())
 
 
-def check_stop(checks, rig, page, until, remote, pki):
-    """The stop over TLS: not for a viewer, at once for an operator, not for one whose certificate is revoked."""
-    state = "document.getElementById('state').textContent"
+def check_second_cause(checks, rig, page, until):
+    """Tripped, and then somebody presses the emergency stop: two latches, one acknowledgement, still one screen."""
+    acknowledge(rig)
+    start_campaign(checks, rig, "a campaign starts that will have two causes")
+    page.until("document.getElementById('state').textContent === 'recording'", 60)
+    rig.order("fault amplitude-scaled=0.5")
+    until("the first cause is shown", "document.getElementById('state').textContent === 'tripped'", 30)
+    rig.order("clear amplitude-scaled")
+    rig.order("estop open")
+    until("a trip with two causes says both", "/commanded.*; emergency-stop chain open/.test(document.getElementById('next-what').textContent)", 30)
+    until("and one acknowledgement for them", "/Mend the causes.*Close the emergency-stop chain.*vibrig ack trip/.test(document.getElementById('next-steps').textContent)")
+    page.ask("shot", file=os.path.join(SHOTS, "two-causes-wall.png"), width=1920, height=1080, scheme="dark")
+    check_whole(checks, page, "wall, two causes", 1080)
+    rig.order("estop close")
+    rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 30)
+
+
+def acknowledge(rig):
     for _ in range(100):
         if rig.tool("ack", "trip", "--by", "page test").returncode == 0:
             break
         time.sleep(0.2)
     rig.tool("abort", "--by", "page test")   # a stop written at rest clears the controller's fault
+
+
+def check_stop(checks, rig, page, until, remote, pki):
+    """The stop over TLS: not for a viewer, at once for an operator, not for one whose certificate is revoked."""
+    state = "document.getElementById('state').textContent"
+    acknowledge(rig)
     start_campaign(checks, rig, "one more campaign starts")
 
     def come_as(name):
@@ -466,6 +487,7 @@ def check_page(checks, rig, page, address, remote, pki):
     page.ask("shot", file=os.path.join(SHOTS, "tripped-phone.png"), width=390, height=844, scheme="dark")
     rig.order("estop close")
     rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 30)
+    check_second_cause(checks, rig, page, until)
     check_stop(checks, rig, page, until, remote, pki)
     # What the browser says of a connection that was cut, and of a command refused, is no error of the page's.
     errors = [e for e in page.ask("errors").get("value", ["?"]) if not any(known in e for known in ("WebSocket", "ERR_", "403"))]

@@ -125,13 +125,16 @@ const Watch = (() => {
     if (e.hidden) return;
     const what = disobeyed ? 'A STOP IS NOT OBEYED. Press the emergency stop.' : `Stopped by ${person(s.interlock.tripped || 'an interlock')}: ${c.reason || ''}`;
     const closed = shaker.emergency_stop_open === false, rests = shaker.rest === 'at rest';
-    const armed = c.state === 'armed', chain = /emergency/.test(s.interlock.tripped + c.reason);
+    const armed = c.state === 'armed', chain = /emergency/.test(s.interlock.tripped + c.reason) || !closed;
+    // One acknowledgement is for all of them; the heading has said the cause.
+    const latches = s.interlock.latches || [], several = latches.length > 1;
     const steps = [
       ...(disobeyed ? [['Press the emergency stop; keep away from the table', shaker.emergency_stop_open === true]] : []),
       ['Look at the rig: the table is at rest', rests],
-      ...(chain || !closed ? [['Close the emergency-stop chain', closed && !disobeyed]] : ['' + c.reason ? ['Mend the cause: ' + c.reason, false] : []]),
-      ['vibrig ack ' + (s.interlock.tripped || 'trip'), !tripped], ['Prove: vibrig selftest --by "YOUR NAME"', false],
-      ['vibrig arm --by "YOUR NAME", then vibrig start, or resume what was interrupted', armed]].filter(x => x.length);
+      ...(!chain || several ? [[several ? 'Mend the causes' : 'Mend the cause', false]] : []),
+      ...(chain ? [['Close the emergency-stop chain', closed && !disobeyed]] : []),
+      ['vibrig ack ' + (latches.length === 1 ? latches[0].name : 'trip'), !tripped], ['Prove: vibrig selftest --by "YOUR NAME"', false],
+      ['vibrig arm --by "YOUR NAME", then vibrig start, or resume what was interrupted', armed]];
     const key = JSON.stringify([what, steps]);
     if (e.dataset.key === key) return;
     e.dataset.key = key;
