@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/judged.hpp"
@@ -37,12 +35,17 @@ std::string result_configuration(const configuration::Loaded& loaded) {
 CampaignDwells::CampaignDwells(const With& with)
     : with_(with),
       configuration_(with.loaded.configuration),
+      files_(configuration_.results,
+             [&events = with.events](Severity severity, const std::string& text) {
+                 events.log(severity, "campaign", text);
+             }),
       adaptive_(adaptive_plan(configuration_)) {}
 
 void CampaignDwells::begin() {
     planning_.abandon();  // of a campaign that was aborted
     assessing_.abandon();
     with_.book.begin(planned_dwells());
+    files_.begin();
     verdict_logged_.clear();
     take_type_prior();
     const std::lock_guard lock(mutex_);
@@ -140,6 +143,7 @@ void CampaignDwells::resume(const std::string& by) {
     planning_.abandon();
     take_type_prior();
     with_.book.continue_from(std::move(interrupted_->book), planned_dwells());
+    files_.begin();
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
     interrupted_.reset();
     auto result = with_.book.identification().result();
@@ -234,10 +238,11 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
     if (written() || !with_.book.free()) return;
     assessing_.abandon();
     keep_revised(campaign);
-    write_result(
-        judge(configuration_.estimator, whole_result(), again(),
-              estimator::uncertainty::Stage::ended, with_.book.identification().rows(), shaken()),
-        campaign);
+    const auto& identification = with_.book.identification();
+    write_result(judge(configuration_.estimator, whole_result(), again(),
+                       estimator::uncertainty::Stage::ended, identification.rows(),
+                       identification.means(), shaken()),
+                 campaign);
 }
 
 /// What marks the campaign, that its result is against the certificate included.
@@ -264,6 +269,7 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     {
         const std::lock_guard lock(mutex_);
         if (!mark.empty()) result_.warnings.push_back("campaign marked: " + mark);
+        for (const auto& words : judged.contradictions) result_.warnings.push_back(words);
         std::optional<tool::KnownType> type;
         if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
@@ -272,7 +278,7 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     }
     StatusData ended;
     campaign.fill(ended, with_.clock.now());
-    write_result_file(text, complete);
+    files_.write(text, complete);
     // The journal first: the recording is closed with the head of this very entry.
     std::uint64_t entry = 0;
     if (with_.journal)
@@ -280,27 +286,6 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     if (with_.recorder)
         with_.recorder->campaign_ended(
             {name_of(ended.state), ended.reason, mark, text, utc_now(), entry});
-}
-
-void CampaignDwells::write_result_file(const std::string& text, bool complete) {
-    if (configuration_.results.empty()) return;
-    // A partial result never takes the place of a complete one.
-    const auto path = std::filesystem::path(configuration_.results) /
-                      (complete ? "result.json" : "result-partial.json");
-    auto unfinished = path;
-    unfinished += ".new";
-    std::ofstream file(unfinished);
-    file << text;
-    file.close();
-    std::error_code error;
-    if (file) std::filesystem::rename(unfinished, path, error);
-    if (!file || error) {
-        with_.events.log(Severity::alarm, "campaign", "cannot write " + path.string());
-    } else {
-        with_.events.log(
-            Severity::info, "campaign",
-            fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
-    }
 }
 
 estimator::Result CampaignDwells::result() const {

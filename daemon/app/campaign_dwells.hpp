@@ -8,6 +8,7 @@
 
 #include "daemon/app/events.hpp"
 #include "daemon/app/fitness.hpp"
+#include "daemon/app/result_files.hpp"
 #include "daemon/archive/outbox.hpp"
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/ports.hpp"
@@ -112,10 +113,10 @@ class CampaignDwells final : public campaign::Dwells {
     void write_result(const Judged& judged, campaign::Campaign& campaign);
     [[nodiscard]] std::string marked(std::string mark);
     void take_anew(const Judged& judged, campaign::Campaign& campaign);
-    void write_result_file(const std::string& text, bool complete);
 
     const With with_;
     const configuration::Configuration& configuration_;
+    ResultFiles files_;
     /// As it was when the campaign was interrupted; until it is resumed.
     struct Interrupted {
         dwells::DwellBook book;

@@ -97,13 +97,15 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
         // dwell, is in nobody's way.
         const auto work = [settings = configuration_.estimator, result = whole_result(),
                            rows = with_.book.identification().rows(),
+                           means = concluding_ ? with_.book.identification().means()
+                                               : std::vector<estimator::DwellMeans>(),
                            shaken = concluding_ ? this->shaken() : estimator::spectrum::Shaken{},
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
                            trim = !with_.memory_locked] {
-            auto found =
-                std::make_shared<const Judged>(judge(settings, result, anew, stage, rows, shaken));
+            auto found = std::make_shared<const Judged>(
+                judge(settings, result, anew, stage, rows, means, shaken));
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;

@@ -6,6 +6,8 @@
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/journal/reread.hpp"
+#include "estimator/commissioning/contradiction.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig {
 
@@ -16,6 +18,7 @@ namespace {
 struct TakenAnew {
     estimator::Result result;
     std::vector<estimator::DwellRow> rows;  ///< of all dwells
+    std::vector<estimator::DwellMeans> means;
 };
 
 /// From the journal, with the noise that was found; nothing: `why_not` says why.
@@ -38,14 +41,15 @@ std::optional<TakenAnew> take_anew(const estimator::Settings& settings, const Ag
         why_not = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
                               result.dwells.size(), again.journal);
     if (!why_not.empty()) return {};
-    return TakenAnew{std::move(found), identification.rows()};
+    return TakenAnew{std::move(found), identification.rows(), identification.means()};
 }
 
 }  // namespace
 
 Judged judge(const estimator::Settings& settings, const estimator::Result& result,
              const std::optional<Again>& again, uncertainty::Stage stage,
-             const std::vector<estimator::DwellRow>& all_rows, estimator::spectrum::Shaken shaken) {
+             const std::vector<estimator::DwellRow>& all_rows,
+             const std::vector<estimator::DwellMeans>& means, estimator::spectrum::Shaken shaken) {
     Judged out;
     if (stage != uncertainty::Stage::ended) {
         out.assessed = uncertainty::assess(settings, result, stage);
@@ -58,6 +62,12 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
              : tool::assess(settings, {}, result, all_rows, std::move(shaken));
     out.assessed = std::move(found.assessed);
     out.spectrum = std::move(found.spectrum);
+    // With the settings of the campaign, whatever noise was found: they name what cannot be.
+    auto contradiction = estimator::commissioning::contradiction_of(
+        settings, anew ? anew->result.dwells : result.dwells, anew ? anew->means : means,
+        anew ? anew->rows : all_rows);
+    out.contradictions = std::move(contradiction.warnings);
+    uncertainty::contradict(out.assessed.verdict, contradiction.first);
     if (!anew) return out;
     out.live = std::make_shared<const dwells::Live>(
         dwells::Live{again->found, result, uncertainty::assess(settings, result)});

@@ -9,6 +9,7 @@
 #include "daemon/domain/events.hpp"
 #include "daemon/dwells/live.hpp"
 #include "daemon/results/spectrum_result.hpp"
+#include "estimator/identification/dwell_means.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
@@ -28,12 +29,16 @@ struct Judged {
     std::shared_ptr<const dwells::Live> live;           ///< what `anew` replaces
     std::string not_anew;                               ///< why not, though it should be
     std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
+    /// For the result, in the end: how the dwells contradict the configuration.
+    std::vector<std::string> contradictions = {};
 };
 
-/// Any thread. `all_rows`: with those apart from the result's.
+/// Any thread. `all_rows`: with those apart from the result's; `means`: of the result's dwells,
+/// wanted in the end.
 [[nodiscard]] Judged judge(const estimator::Settings& settings, const estimator::Result& result,
                            const std::optional<Again>& again, estimator::uncertainty::Stage stage,
                            const std::vector<estimator::DwellRow>& all_rows,
+                           const std::vector<estimator::DwellMeans>& means,
                            estimator::spectrum::Shaken shaken);
 
 [[nodiscard]] Severity severity_of(estimator::uncertainty::Level level);

@@ -25,8 +25,8 @@ std::string in_one(const std::vector<std::string>& all) {
 }
 
 /// Of the readings, least squares; angles may pass half a turn.
-room::DwellMean mean_of(const std::vector<rt::MeanMotion>& seconds, bool drifts) {
-    room::DwellMean mean;
+estimator::DwellMean mean_of(const std::vector<rt::MeanMotion>& seconds, bool drifts) {
+    estimator::DwellMean mean;
     mean.level_known = drifts;
     const double n = static_cast<double>(seconds.size());
     using estimator::kDegPerRad;
@@ -108,7 +108,7 @@ OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
                         std::sqrt(1.2 * 3600 / static_cast<double>(kDriftSeconds));
     limits.rate_sigma = std::hypot(noise, walk, 0.01);
     limits.refused_deg = std::max(limits.refused_deg, settings_.gravity_refused_deg);
-    std::vector<room::DwellMean> means;
+    std::vector<estimator::DwellMean> means;
     for (const Stood& stood : stops_) means.push_back(mean_of(stood.seconds, stood.stop.drifts));
     const auto found = room::hold_at_rest(rig, means, limits);
     Verdict verdict{in_one(found.refused), in_one(found.warned), {}, {}};

@@ -222,12 +222,14 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     take();
     out.result = player.book().identification().result();
     out.rows = player.book().identification().rows();
+    out.means = player.book().identification().means();
     qualify(campaign, out.dwells.size(), out.result);
     out.found = decide ? player.book().noise().found() : campaign.found;
     if (out.found) {
         const dwells::Anew again = anew(campaign, settings, *out.found);
         out.live = std::exchange(out.result, again.result());
         out.rows = again.identification().rows();
+        out.means = again.identification().means();
         take_estimate(again.identification(), out.anew.emplace());
         qualify(campaign, out.dwells.size(), out.result);
     }

@@ -6,6 +6,7 @@
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
+#include "estimator/identification/dwell_means.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/spectrum/read_sweep.hpp"
 
@@ -19,8 +20,9 @@ struct ReplayOptions {
 
 struct ReplayResult {
     estimator::Result result;
-    std::vector<estimator::DwellRow> rows;  ///< of all dwells, those apart from the result's too
-    std::vector<Dwell> dwells;              ///< as they were shown live
+    std::vector<estimator::DwellRow> rows;     ///< of all dwells, those apart from the result's too
+    std::vector<estimator::DwellMeans> means;  ///< of the result's dwells
+    std::vector<Dwell> dwells;                 ///< as they were shown live
     /// Where the result was identified anew: what it replaces, and the coefficients as a dwell has
     /// them.
     std::optional<noise::Found> found;

@@ -19,6 +19,9 @@ constexpr double kForceSigma_g = 3e-3;
 /// Linear drift terms are believed to be about so large, deg/h/g: what the sign of the latitude is
 /// recognised by.
 constexpr double kLinearSigma = 2, kEarthFixed = 1e-3;
+/// Fewer attitudes than these are explained by zeros, whatever is wrong.
+constexpr std::size_t kZeroDwells = 4;
+constexpr double kLargestZero_g = 0.03;
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 
 class Search {
@@ -29,6 +32,7 @@ class Search {
     std::vector<Suspect> run() {
         signs_and_zeros();
         accelerometers();
+        accelerometer_zeros();
         verticals_up();
         lean();
         site();
@@ -114,6 +118,28 @@ class Search {
             }
             consider(s, std::move(what));
         }
+    }
+
+    /// Three values at once: what the forces of several attitudes have in common.
+    void accelerometer_zeros() {
+        if (dwells_.size() < kZeroDwells) return;
+        Eigen::Matrix3d matrix;
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k)
+                matrix(i, k) = as_is_.accelerometer_matrix[static_cast<std::size_t>(i)]
+                                                          [static_cast<std::size_t>(k)];
+        Eigen::Vector3d off = Eigen::Vector3d::Zero();
+        for (const Verticals& v : verticals(as_is_, dwells_)) off += v.force - v.encoders;
+        off = matrix.inverse() * off / static_cast<double>(dwells_.size());
+        if (!(off.cwiseAbs().maxCoeff() <= kLargestZero_g)) return;
+        Settings s = as_is_;
+        for (std::size_t k = 0; k < 3; ++k) s.accelerometer_zero_g[k] += off[static_cast<int>(k)];
+        const auto list = [](const std::array<double, 3>& g, const char* form) {
+            return text(form, g[0], g[1], g[2]);
+        };
+        consider(s, "accelerometer.zero_g: about " +
+                        list(s.accelerometer_zero_g, "[%.4f, %.4f, %.4f]") + " instead of " +
+                        list(as_is_.accelerometer_zero_g, "[%g, %g, %g]"));
     }
 
     void verticals_up() {

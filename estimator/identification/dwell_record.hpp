@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "estimator/identification/dwell_means.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/random_level.hpp"
 
@@ -11,7 +12,8 @@ namespace vibrig::estimator {
 /// Counts of the dwell in progress; samples = used + rejected at any time nothing is buffered.
 struct DwellRecord {
     DwellInfo info;
-    Seen seen;  ///< of this vibration by the accelerometers
+    DwellMeans means;  ///< of its readings as they came; nothing of a sweep
+    Seen seen;         ///< of this vibration by the accelerometers
     std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
     std::uint32_t gated = 0;  ///< of the rejected: angles too far from the predicted ones
     double nis_sum = 0;

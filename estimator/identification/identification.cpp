@@ -89,6 +89,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
 
 void Identification::Impl::reserve(std::size_t max_dwells) {
     dwells.reserve(max_dwells);
+    means.reserve(max_dwells);
     rows.reserve(settings.method == Method::joint ? max_dwells : 0);
     paper_starts_.reserve(max_dwells);
 }
@@ -203,6 +204,7 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
     }
     bad_times_in_a_row_ = 0;
     if (swept_) return leave_alone(measurement);
+    record_.means.add(measurement);
     if (!first && (restart || dt > kLongestPause_s)) {
         end_stretch();
         active_->filter.begin_dwell();
@@ -499,6 +501,7 @@ DwellSummary Identification::Impl::end_dwell(bool cut_short) noexcept {
     ++dwells_ended;
     if (dwells.size() < dwells.capacity()) {
         dwells.push_back(verdict.summary);
+        means.push_back(record_.means);
     } else {
         ++dwells_not_kept;
     }
@@ -551,6 +554,7 @@ Identification::Identification(const Settings& settings, std::size_t max_dwells)
 void Identification::reserve(std::size_t max_dwells) {
     impl_->reserve(max_dwells);
     bring_in(impl_->dwells, max_dwells);
+    bring_in(impl_->means, max_dwells);
     if (impl_->settings.method == Method::joint) bring_in(impl_->rows, max_dwells);
 }
 Identification::~Identification() = default;
@@ -579,6 +583,8 @@ const NoiseLevels& Identification::noise() const noexcept { return impl_->noise;
 Result Identification::result() const { return impl_->result(); }
 
 const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
+
+const std::vector<DwellMeans>& Identification::means() const noexcept { return impl_->means; }
 
 void Identification::solved(Estimate& out) const noexcept { impl_->solved(out); }
 

@@ -13,6 +13,7 @@
 
 namespace vibrig::estimator {
 
+class DwellMeans;
 struct DwellRow;
 struct Result;
 
@@ -86,6 +87,8 @@ class Identification {
     [[nodiscard]] Result result() const;
     /// Those of result() and, in their order, those apart from them.
     [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
+    /// Of each dwell of result().dwells, in their order; nothing is known of a sweep.
+    [[nodiscard]] const std::vector<DwellMeans>& means() const noexcept;
     /// Covariance of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not
     /// they are observable. Allocates.
     [[nodiscard]] std::vector<double> covariance() const;

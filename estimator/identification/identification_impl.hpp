@@ -67,6 +67,7 @@ struct Identification::Impl {
     NoiseLevels noise;  ///< that the filters take
     Solution solution;  ///< after the last ended dwell, as with constant biases
     std::vector<DwellSummary> dwells;
+    std::vector<DwellMeans> means;  ///< of the same
     std::vector<DwellRow> rows;
     std::size_t dwells_not_kept = 0;  ///< summaries beyond max_dwells
     std::uint64_t samples = 0, used = 0, rejected = 0, nis_count = 0;

@@ -400,4 +400,12 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     return verdict;
 }
 
+void contradict(Verdict& verdict, const std::string& contradiction) {
+    if (contradiction.empty()) return;
+    const std::string text = "the configuration does not fit the recording: " + contradiction;
+    verdict.level = Level::not_valid;
+    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
+    verdict.sentence = "not valid, because " + text;
+}
+
 }  // namespace vibrig::estimator::uncertainty

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "estimator/uncertainty/assessment.hpp"
 
@@ -15,5 +16,8 @@ namespace vibrig::estimator::uncertainty {
                                                    const Assessment& assessed);
 /// Puts the reasons in order; level and sentence follow from them.
 void conclude(const Assessment& assessed, Verdict& verdict);
+/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
+/// `contradiction`: the first; empty changes nothing.
+void contradict(Verdict& verdict, const std::string& contradiction);
 
 }  // namespace vibrig::estimator::uncertainty

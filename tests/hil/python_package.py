@@ -361,22 +361,38 @@ def check_contradiction(checks, programs, folder):
     try:
         rig.start_plant("--seed", "1", "--truth", rig.truth_file({"accelerometer": {"zero_g": [0.015, 0.0, 0.0]}, **r.QUICK}), "--speed", "max")
         rig.configure({**CAMPAIGN, "name": "crooked", "table_g": [9.0, 0.0]}, unit={"type": "GP-3", "serial": "0017"})
+        yesterday = os.path.join(rig.results, "result.json")
+        os.makedirs(rig.results, exist_ok=True)
+        with open(yesterday, "w", encoding="utf-8") as file:
+            file.write("yesterday's")
+        os.utime(yesterday, (1772352000, 1772352000))
         rig.start_daemon()
         rig.wait_for(r.measuring, 30)
         for command in ("arm", "start"):
             rig.tool(command, "--by", "A. Person")
+        checks.equal([name for name in os.listdir(rig.results) if name.startswith("result")], ["result-20260301T080000Z.json"],
+                     "a campaign that begins puts aside the result of the one before")
         rig.wait_for_state(("finished", "aborted", "tripped"), 120)
         rig.wait_for(lambda s: not s["recorder"].get("recording"), 30)
+        with open(yesterday, encoding="utf-8") as file:
+            written = file.read().strip()
+        status = rig.status()
     finally:
         rig.stop()
     recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("crooked-"))
+    result = json.loads(written)
+    checks.check(result["verdict"]["word"] == "not valid" and result["verdict"]["reasons"][0]["code"] == "configuration" and
+                 any(w.startswith("suspects, best first: accelerometer.zero_g: about [0.01") for w in result["warnings"]),
+                 "the daemon's own result says that the configuration does not fit", f"{result['verdict']} {result['warnings']}")
+    checks.check(status["verdict"]["word"] == "not valid", "and so does its status", str(status.get("verdict")))
+    checks.equal(tool(rig, "replay", recording, "--json").stdout.strip(), written, "a replay gives that result to the last bit")
     with open(os.path.join(folder, "paper.toml"), "w", encoding="utf-8") as file:
         file.write('number = "1"\n[laboratory]\nname = "L"\n[customer]\nname = "C"\n')
     for command in (("identify", recording), ("replay", recording), ("report", recording, "-o", "r.html"),
                     ("certificate", recording, "--paper", "paper.toml", "--by", "A", "--no-journal")):
         run = tool(rig, *command)
-        checks.check(run.returncode == 1 and "not valid, because the configuration does not fit the recording: " in run.stdout + run.stderr,
-                     f"vibrig {command[0]}: a configuration that does not fit is no result", f"status {run.returncode} {(run.stdout + run.stderr)[-600:]}")
+        checks.check(run.returncode == 1 and "the configuration does not fit the recording: " in run.stdout + run.stderr and
+                     "not valid" in run.stdout + run.stderr, f"vibrig {command[0]}: a configuration that does not fit is no result", f"status {run.returncode} {(run.stdout + run.stderr)[-600:]}")
 
 
 def main():

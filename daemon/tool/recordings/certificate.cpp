@@ -268,6 +268,8 @@ nlohmann::ordered_json certificate_for(const record::Campaign& campaign, const I
     }
     Assessed found = assess(rig.estimator, replayed.found, replayed.result, replayed.rows,
                             record::shaken_of(campaign, rig));
+    const std::string contradiction =
+        doubt_replayed(rig.estimator, replayed, found.assessed.verdict);
     const std::string text = replayed_json(replayed, found, rig.estimator, campaign.head.simulated);
     auto certificate =
         report::certificate_of(campaign, nlohmann::ordered_json::parse(text), replayed, issue);
@@ -277,8 +279,6 @@ nlohmann::ordered_json certificate_for(const record::Campaign& campaign, const I
                               ": found a result that does not come out of the recording again, "
                               "expected every number of it: " +
                               difference);
-    const std::string contradiction =
-        doubt_replayed(campaign, rig.estimator, replayed, found.assessed.verdict);
     if (!contradiction.empty())
         throw report::Refused(campaign.path + ": found a result that is " +
                               found.assessed.verdict.sentence + ", expected a valid one");

@@ -20,16 +20,18 @@
 #include "daemon/results/spectrum_result.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/rt/dwell_order.hpp"
-#include "daemon/tool/analysis/rig_doubts.hpp"
 #include "daemon/tool/analysis/seen_plan.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "daemon/tool/analysis/swept_dwells.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/replayed_result.hpp"
+#include "estimator/commissioning/contradiction.hpp"
+#include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/spectrum/sampling.hpp"
 #include "estimator/spectrum/seen.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -49,17 +51,20 @@ struct Found {
     estimator::spectrum::Shaken shaken;
 };
 
-/// `rows`: of all dwells.
-Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRow>& rows,
-                  const RigDoubts& doubts) {
-    Found found;
-    found.result = std::move(result);
-    found.contradiction = doubts.tell(found.result, rows);
-    return found;
+/// What is unusual of the configuration, and what of the recording contradicts it.
+void tell_doubts(const estimator::Settings& settings,
+                 const estimator::Identification& identification, Found& found) {
+    auto& warnings = found.result.warnings;
+    for (const auto& doubt : estimator::doubtful_keys(settings))
+        warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " + doubt.expected);
+    const auto contradiction = estimator::commissioning::contradiction_of(
+        settings, found.result.dwells, identification.means(), identification.rows());
+    warnings.insert(warnings.end(), contradiction.warnings.begin(), contradiction.warnings.end());
+    found.contradiction = contradiction.first;
 }
 
-/// What the filter need not be asked for, of rows in their order: where a dwell begins, what a plan
-/// would have said of it, and what contradicts the configuration.
+/// What the filter need not be asked for, of rows in their order: where a dwell begins, and what a
+/// plan would have said of it.
 class RowsSeen {
   public:
     struct Row {
@@ -69,7 +74,7 @@ class RowsSeen {
         bool held_out = false;  ///< to prove a result
     };
 
-    explicit RowsSeen(const estimator::Settings& settings) : doubts_(settings), plan_(settings) {}
+    explicit RowsSeen(const estimator::Settings& settings) : plan_(settings) {}
 
     /// One dwell for each stretch of rows with the same run and position: a pair that comes back
     /// begins another.
@@ -83,20 +88,16 @@ class RowsSeen {
             any_ = true;
             run_ = row.run;
             position_ = row.position;
-            doubts_.begin_dwell();
             plan_.begin_dwell(run_);
         }
         last_s_ = row.time_s;
         plan_.add(seen.measurement);
-        doubts_.add(seen.measurement);
         return seen;
     }
     [[nodiscard]] bool common_clock() const { return common_clock_; }
-    [[nodiscard]] const RigDoubts& doubts() const { return doubts_; }
     [[nodiscard]] SeenPlan& plan() { return plan_; }
 
   private:
-    RigDoubts doubts_;
     SeenPlan plan_;
     bool any_ = false, common_clock_ = true;
     int run_ = 0, position_ = 0;
@@ -123,9 +124,10 @@ class RowsIdentified {
     }
     Found found(const RowsSeen& seen) {
         if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
-        auto result = identification_.result();
-        for (auto& row : result.rows) row.common_clock = seen.common_clock();
-        Found found = with_doubts(std::move(result), identification_.rows(), seen.doubts());
+        Found found;
+        found.result = identification_.result();
+        for (auto& row : found.result.rows) row.common_clock = seen.common_clock();
+        tell_doubts(settings_, identification_, found);
         for (const estimator::DwellRow& row : identification_.rows())
             if (row.held_out) found.kept_out.push_back({row, {}});
         return found;
@@ -314,7 +316,6 @@ class DwellsIdentified {
           file_(file),
           common_clock_(has_common_clock(dwells)),
           identification_(settings, dwells.size()),
-          doubts_(settings),
           plan_(settings) {
         std::size_t samples = 0, done = 0;
         for (const Dwell& dwell : dwells) samples += dwell.rows.size();
@@ -325,7 +326,6 @@ class DwellsIdentified {
             for (const RecordingRow* row : dwells[d].rows) {
                 const auto measurement = measurement_of(*row);
                 static_cast<void>(identification_.add(measurement));
-                doubts_.add(measurement);
                 plan_.add(measurement);
                 // Asking a clock costs more than a filter step.
                 if (++done % 1024 == 0) progress.show(done, samples);
@@ -341,7 +341,7 @@ class DwellsIdentified {
         if (!held_out) plan_.tell();
         found_.kinds = kinds_.kinds();
         found_.result = identification_.result();
-        found_.contradiction = doubts_.tell(found_.result, identification_.rows());
+        tell_doubts(settings_, identification_, found_);
         return std::move(found_);
     }
 
@@ -359,7 +359,6 @@ class DwellsIdentified {
             info.seen = estimator::spectrum::seen_of(settings_.accelerometer_response,
                                                      kinds_.kinds()[*kind].bands);
         identification_.begin_dwell(info);
-        doubts_.begin_dwell();
         plan_.begin_dwell(dwell.run);
     }
     [[nodiscard]] bool is_random(std::size_t d) const {
@@ -400,7 +399,6 @@ class DwellsIdentified {
     const std::string& file_;
     bool common_clock_;
     estimator::Identification identification_;
-    RigDoubts doubts_;
     SeenPlan plan_;
     Found found_;
     std::vector<std::size_t> resting_;
@@ -462,8 +460,9 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
                      [&](std::size_t, const estimator::StepResult&) {
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
-    Found found = with_doubts(anew ? anew->result() : identification.result(),
-                              identification.rows(), doubts_of(campaign, settings));
+    Found found;
+    found.result = anew ? anew->result() : identification.result();
+    tell_doubts(settings, identification, found);
     record::qualify(campaign, dwells.size(), found.result);
     found.rows = identification.rows();
     return found;
@@ -563,7 +562,7 @@ Identified identify_recording(const std::string& file, const std::string& config
         if (row.psd > 0 && row.psd <= found.shaken.psds.size())
             identified.held_out.back().kind.bands = found.shaken.psds[row.psd - 1];
     }
-    contradict(identified.assessed.verdict, found.contradiction);
+    estimator::uncertainty::contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
 

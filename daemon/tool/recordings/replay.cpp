@@ -197,12 +197,12 @@ int replay(const ReplayArguments& arguments) {
                             campaign.head.instruction_set == estimator::instruction_set();
     auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
                         record::shaken_of(campaign, rig));
+    doubt_replayed(settings, replayed, found.assessed.verdict);
     // Of other settings, and where the dwells differ, it is another anyway.
     const std::string difference = arguments.config.empty() && replayed.different == 0
                                        ? not_as_recorded(campaign, replayed, found, settings)
                                        : "";
     const auto& assessed = found.assessed;
-    doubt_replayed(campaign, settings, replayed, found.assessed.verdict);
     const bool simulated = campaign.head.simulated;
     if (!arguments.plot.empty())
         report::plot_result(arguments.plot, replayed.result, assessed, simulated);

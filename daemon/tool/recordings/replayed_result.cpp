@@ -7,7 +7,8 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/results/result_difference.hpp"
 #include "daemon/results/result_json.hpp"
-#include "daemon/rt/dwell_order.hpp"
+#include "estimator/commissioning/contradiction.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::tool {
 
@@ -28,28 +29,14 @@ std::string not_as_recorded(const record::Campaign& campaign, const record::Repl
                              replayed_json(replayed, found, settings, campaign.head.simulated));
 }
 
-RigDoubts doubts_of(const record::Campaign& campaign, const estimator::Settings& settings) {
-    RigDoubts doubts(settings);
-    for (const auto& dwell : record::recorded_dwells(campaign)) {
-        doubts.begin_dwell();
-        if (dwell.order->sweep.any()) continue;
-        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
-            doubts.add(
-                rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
-    }
-    return doubts;
-}
-
-std::string doubt_replayed(const record::Campaign& campaign, const estimator::Settings& settings,
-                           record::ReplayResult& replayed,
+std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,
                            estimator::uncertainty::Verdict& verdict) {
-    // What is merely unusual of the configuration is no part of the daemon's result.
-    auto warned = replayed.result;
-    const std::string contradiction = doubts_of(campaign, settings).tell(warned, replayed.rows);
-    if (contradiction.empty()) return {};
-    replayed.result = std::move(warned);
-    contradict(verdict, contradiction);
-    return contradiction;
+    const auto found = estimator::commissioning::contradiction_of(settings, replayed.result.dwells,
+                                                                  replayed.means, replayed.rows);
+    auto& warnings = replayed.result.warnings;
+    warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
+    estimator::uncertainty::contradict(verdict, found.first);
+    return found.first;
 }
 
 }  // namespace vibrig::tool

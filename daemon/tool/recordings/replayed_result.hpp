@@ -4,7 +4,6 @@
 
 #include "daemon/record/replay.hpp"
 #include "daemon/results/spectrum_result.hpp"
-#include "daemon/tool/analysis/rig_doubts.hpp"
 
 namespace vibrig::tool {
 
@@ -19,13 +18,9 @@ namespace vibrig::tool {
                                           const Assessed& found,
                                           const estimator::Settings& settings);
 
-/// A campaign's dwells as they were fed, its sweeps left out.
-[[nodiscard]] RigDoubts doubts_of(const record::Campaign& campaign,
-                                  const estimator::Settings& settings);
-/// Where the recording contradicts the configuration, the replay's result has warnings of it and
-/// the verdict is no. The contradiction; empty: none.
-std::string doubt_replayed(const record::Campaign& campaign, const estimator::Settings& settings,
-                           record::ReplayResult& replayed,
+/// As the daemon at a campaign's end: where the recording contradicts the configuration, the
+/// result has warnings of it and the verdict is no. The contradiction; empty: none.
+std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,
                            estimator::uncertainty::Verdict& verdict);
 
 }  // namespace vibrig::tool

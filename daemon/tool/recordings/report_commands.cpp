@@ -115,7 +115,7 @@ int make_report(const ReportArguments& arguments) {
             progress.show(static_cast<std::size_t>(100 * fraction), 100);
         });
     }
-    doubt_replayed(campaign, rig.estimator, analysis.replayed, analysis.assessed.verdict);
+    doubt_replayed(rig.estimator, analysis.replayed, analysis.assessed.verdict);
     try {
         add_history(campaign, arguments.archive, analysis);
     } catch (const std::exception& error) {

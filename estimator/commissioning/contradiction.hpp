@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimator/filter/settings.hpp"
+#include "estimator/identification/dwell_means.hpp"
+#include "estimator/identification/result.hpp"
+
+namespace vibrig::estimator::commissioning {
+
+/// What of a campaign contradicts the configuration that it is identified with: gravity, Earth rate
+/// and what 30 coefficients cannot explain (docs/commissioning.md).
+struct Contradiction {
+    std::string first;                  ///< empty: the configuration fits
+    std::vector<std::string> warnings;  ///< all of them, and which keys would explain them
+};
+/// `dwells` and `means` as the identification has them, one for one; `rows`: of all dwells, those
+/// apart from the result included. Throws SettingsError.
+[[nodiscard]] Contradiction contradiction_of(const Settings& settings,
+                                             const std::vector<DwellSummary>& dwells,
+                                             const std::vector<DwellMeans>& means,
+                                             const std::vector<DwellRow>& rows);
+
+}  // namespace vibrig::estimator::commissioning

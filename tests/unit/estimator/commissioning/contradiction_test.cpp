@@ -1,0 +1,106 @@
+// What the dwells of a campaign say of the configuration that they were identified with.
+#include "estimator/commissioning/contradiction.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <functional>
+
+#include "estimator/filter/angles.hpp"
+#include "tests/plant/simulation.hpp"
+
+namespace vibrig::estimator::commissioning {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+/// Of `positions` dwells; `to`: the dwell as it is told to the filter.
+Contradiction found(const Settings& settings, std::size_t positions,
+                    const std::function<void(DwellInfo&)>& to = {}) {
+    plant::Truth truth;
+    truth.seed = 11;
+    plant::CampaignPlan plan;
+    plan.dwell_s = 20;
+    Identification identification(settings);
+    DwellInfo info{1, 1};
+    const auto begin = [&] {
+        if (to) to(info);
+        identification.begin_dwell(info);
+    };
+    std::size_t dwells = 0;
+    begin();
+    plant::simulate(
+        truth, plan,
+        [&](const plant::PlannedSample& sample) {
+            if (dwells == positions) return;
+            Measurement m;
+            m.time_s = sample.time_s;
+            for (std::size_t k = 0; k < 3; ++k) {
+                m.angle_rad[k] = sample.readings.encoder_deg[k] * kRadPerDeg;
+                m.force_g[k] = sample.readings.raw_g[k];
+            }
+            static_cast<void>(identification.add(m));
+        },
+        [&](std::size_t, std::size_t) {
+            if (dwells == positions) return;
+            static_cast<void>(identification.end_dwell());
+            if (++dwells == positions) return;
+            info = {dwells < 14 ? 1 : 2, static_cast<int>(dwells % 14) + 1};
+            begin();
+        });
+    const Result result = identification.result();
+    EXPECT_THAT(identification.means(), SizeIs(result.dwells.size()));
+    return contradiction_of(settings, result.dwells, identification.means(), identification.rows());
+}
+
+TEST(Contradiction, IsNotFoundWhereTheConfigurationIsTheRigs) {
+    const auto of = found({}, 28);
+    EXPECT_EQ(of.first, "");
+    EXPECT_THAT(of.warnings, IsEmpty());
+}
+
+TEST(Contradiction, OfAnAccelerometersZeroShowsInOneDwell) {
+    Settings settings;
+    settings.accelerometer_zero_g = {0, 0, 0.015};  // 0.86 deg
+    const auto of = found(settings, 1);
+    EXPECT_THAT(of.first, HasSubstr("mean force 0.8"));
+    ASSERT_THAT(of.warnings, SizeIs(2));
+    EXPECT_EQ(of.warnings[0], "configuration and recording do not fit: " + of.first);
+}
+
+TEST(Contradiction, OfAnAccelerometersZeroNamesIt) {
+    Settings settings;
+    settings.accelerometer_zero_g = {0, 0, 0.015};
+    const auto of = found(settings, 14);
+    ASSERT_THAT(of.warnings, SizeIs(2));
+    // The rig has none: what is named is 0 within what 14 dwells know of it.
+    std::array<double, 3> zero{1, 1, 1};
+    ASSERT_EQ(std::sscanf(of.warnings[1].c_str(),
+                          "suspects, best first: accelerometer.zero_g: about [%lf, %lf, %lf]",
+                          &zero[0], &zero[1], &zero[2]),
+              3)
+        << of.warnings[1];
+    for (const double z : zero) EXPECT_NEAR(z, 0, 1e-3);
+}
+
+TEST(Contradiction, NamesTheKeyThatWouldExplainIt) {
+    Settings settings;
+    settings.encoder_sign = {-1, 1, 1};
+    const auto of = found(settings, 28);
+    ASSERT_NE(of.first, "");
+    EXPECT_THAT(of.warnings.back(), HasSubstr("suspects, best first: platform.encoder_sign: 1 "
+                                              "instead of -1 of the outer"));
+}
+
+TEST(Contradiction, AsksNoDwellThatIsApartAndNoSweep) {
+    Settings settings;
+    settings.accelerometer_zero_g = {0, 0, 0.015};
+    EXPECT_EQ(found(settings, 3, [](DwellInfo& dwell) { dwell.held_out = true; }).first, "");
+    EXPECT_EQ(found(settings, 3, [](DwellInfo& dwell) { dwell.sweep.to_hz = 100; }).first, "");
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::commissioning
