@@ -5,9 +5,12 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/text.hpp"
+
 namespace vibrig::proto {
 
-/// Insertions, deletions and substitutions from one word to the other (Levenshtein).
+/// Insertions, deletions and substitutions from one word to the other (Levenshtein), cases being
+/// one.
 [[nodiscard]] inline std::size_t edits(std::string_view a, std::string_view b) {
     std::vector<std::size_t> row(b.size() + 1);
     for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -15,12 +18,19 @@ namespace vibrig::proto {
         std::size_t diagonal = row[0];
         row[0] = i;
         for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+            const std::size_t substituted =
+                diagonal + (same_name(a.substr(i - 1, 1), b.substr(j - 1, 1)) ? 0 : 1);
             diagonal = row[j];
             row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
         }
     }
     return row[b.size()];
+}
+
+/// A key or column that is hardly anything but `known`, misspelt: one letter in three is another.
+[[nodiscard]] inline bool misspelt(std::string_view name, std::string_view known) {
+    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
+    return name.size() <= kLongest && edits(name, known) * kLettersPerEdit <= name.size();
 }
 
 }  // namespace vibrig::proto

@@ -58,8 +58,9 @@ std::optional<std::string_view> LineReader::next() {
         if (searched > kMaximumLine) return take(searched);
         if (fill()) continue;
         if (searched == 0) return std::nullopt;
-        const std::string_view text = take(searched);  // a last line without an end
+        const std::string_view text = take(searched);
         begin_ = end_;
+        ended_ = false;
         return text;
     }
 }

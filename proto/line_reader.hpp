@@ -21,6 +21,8 @@ class LineReader {
     [[nodiscard]] std::optional<std::string_view> next();
     /// Number of the line that next() returned or failed at, from 1.
     [[nodiscard]] std::size_t line() const noexcept { return line_; }
+    /// The line that next() returned has an end; the last of a file may have none.
+    [[nodiscard]] bool ended() const noexcept { return ended_; }
     [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }  ///< read of the file
 
   private:
@@ -37,6 +39,7 @@ class LineReader {
     std::size_t end_ = 0;
     std::size_t line_ = 0;
     std::uint64_t bytes_ = 0;
+    bool ended_ = true;
 };
 
 }  // namespace vibrig::proto

@@ -11,6 +11,7 @@
 
 #include "proto/edits.hpp"
 #include "proto/line_reader.hpp"
+#include "proto/open_end.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::proto {
@@ -45,6 +46,7 @@ constexpr std::size_t kPosition = 2;
 constexpr std::size_t kAngles = 3;
 constexpr std::size_t kForces = 6;
 constexpr std::size_t kNone = kColumns.size();
+constexpr std::string_view kSimulated = "simulated";
 
 std::string locate(const std::string& file, std::size_t line, const std::string& column,
                    const std::string& what) {
@@ -60,19 +62,10 @@ std::string quoted(std::string_view text) {
 
 std::string_view trim(std::string_view text) noexcept { return trimmed(text, " \t"); }
 
-/// Names of columns, whatever their case.
-bool same(std::string_view name, std::string_view found) {
-    return std::equal(name.begin(), name.end(), found.begin(), found.end(), [](char a, char b) {
-        return a == (b >= 'A' && b <= 'Z' ? static_cast<char>(b - 'A' + 'a') : b);
-    });
-}
-
 constexpr std::size_t kMisspelt = 2;  ///< edits
 
 bool misspelt_role(std::string_view word) {
-    std::string lower(word);
-    for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    return edits(lower, "verify") <= kMisspelt || edits(lower, "identify") <= kMisspelt;
+    return edits(word, "verify") <= kMisspelt || edits(word, "identify") <= kMisspelt;
 }
 
 std::string text_of(double value) {
@@ -87,8 +80,6 @@ class RecordingReader::Rows {
   public:
     explicit Rows(const std::string& path) try : path_(path), lines_(path) {
         read_header();
-        simulated_ =
-            std::ranges::any_of(fields_, [](auto name) { return same("simulated", name); });
         frequency_ = std::ranges::count(roles_, kFrequency) > 0;
         profile_ = std::ranges::count(roles_, kProfile) > 0;
     } catch (const RecordingError&) {
@@ -112,6 +103,7 @@ class RecordingReader::Rows {
     [[nodiscard]] bool has_profile() const { return profile_; }
     [[nodiscard]] const std::vector<std::string>& profiles() const { return profiles_; }
     [[nodiscard]] std::uint64_t bytes() const { return lines_.bytes(); }
+    [[nodiscard]] const std::string& warning() const { return warning_; }
 
   private:
     /// Tells a dwell that is there twice: times may begin anew in each dwell, but noise does not
@@ -234,10 +226,13 @@ class RecordingReader::Rows {
         }
         find_separator(*line);
         split(without_byte_order_mark(*line));
+        simulated_ =
+            std::ranges::any_of(fields_, [](auto name) { return same_name(kSimulated, name); });
         std::array<bool, kColumns.size()> seen{};
         for (const std::string_view name : fields_) {
-            const auto found = std::find_if(kColumns.begin(), kColumns.end(),
-                                            [&](const Column& c) { return same(c.name, name); });
+            const auto found = std::find_if(kColumns.begin(), kColumns.end(), [&](const Column& c) {
+                return same_name(c.name, name);
+            });
             const auto index = static_cast<std::size_t>(found - kColumns.begin());
             if (index != kNone && std::exchange(seen.at(index), true)) {
                 fail(name, "found twice in the header, expected once");
@@ -253,13 +248,42 @@ class RecordingReader::Rows {
             fail("", "found the header " + quoted(trim(without_byte_order_mark(*line))) +
                          ", expected also the column(s) " + missing);
         }
+        refuse_misspelt(seen);
         // Of no profile there is no level: the column is somebody else's.
         if (!seen.at(kProfile)) std::ranges::replace(roles_, kLevel, kNone);
         own_role_ = seen.at(kFrequency) || seen.at(kProfile);
     }
 
+    /// Ignored as a column of somebody's, one of these would leave the vibration to the
+    /// configuration, or a simulation unmarked. `role` and `level_db` may be anybody's.
+    void refuse_misspelt(const std::array<bool, kColumns.size()>& seen) const {
+        for (std::size_t i = 0; i < fields_.size(); ++i) {
+            if (roles_[i] != kNone || same_name(fields_[i], kSimulated)) continue;
+            for (const auto& [meant, there] :
+                 {std::pair{kColumns[kFrequency].name, seen[kFrequency]},
+                  {kColumns[kProfile].name, seen[kProfile]},
+                  {kSimulated, simulated_}}) {
+                if (there || !misspelt(fields_[i], meant)) continue;
+                std::string known;
+                for (const Column& column : kColumns) known += std::string(column.name) + ", ";
+                fail(fields_[i], "found an unknown name, perhaps for " + std::string(meant) +
+                                     ", expected one of " + known + std::string(kSimulated) +
+                                     ", or one that is unlike them");
+            }
+        }
+    }
+
+    /// Of a line without an end, which may be cut.
+    void check_end() {
+        const bool read = fields_.size() == roles_.size() && roles_.back() != kNone;
+        const auto cut = cut_fields(fields_.size(), roles_.size(), fields_.back(), read);
+        if (!cut.empty()) fail("", cut);
+        warning_ = tell_open_end(path_ + ":" + std::to_string(lines_.line()), fields_.back());
+    }
+
     RecordingRow row(std::string_view line) {
         split(line);
+        if (!lines_.ended()) check_end();
         const bool trailing_comma = fields_.size() == roles_.size() + 1 && fields_.back().empty();
         if (fields_.size() != roles_.size() && !trailing_comma) {
             const bool decimal_commas =
@@ -315,8 +339,8 @@ class RecordingReader::Rows {
     /// of its vibration otherwise, too, or where one of its words is known.
     bool held_out(std::string_view field) {
         if (field.empty() || (other_role_ && field == other_role_->second)) return false;
-        const bool verify = same("verify", field);
-        if (!verify && !same("identify", field)) {
+        const bool verify = same_name("verify", field);
+        if (!verify && !same_name("identify", field)) {
             if (own_role_ || misspelt_role(field)) refuse_role(lines_.line(), field);
             if (!other_role_) other_role_.emplace(lines_.line(), field);
             return false;
@@ -422,7 +446,7 @@ class RecordingReader::Rows {
                                  std::to_string(before) + ", expected each dwell once");
     }
 
-    std::string path_;
+    std::string path_, warning_;
     LineReader lines_;
     bool simulated_ = false;
     bool frequency_ = false, profile_ = false;
@@ -450,5 +474,6 @@ bool RecordingReader::has_frequency() const { return rows_->has_frequency(); }
 bool RecordingReader::has_profile() const { return rows_->has_profile(); }
 const std::vector<std::string>& RecordingReader::profiles() const { return rows_->profiles(); }
 std::uint64_t RecordingReader::bytes() const { return rows_->bytes(); }
+const std::string& RecordingReader::warning() const { return rows_->warning(); }
 
 }  // namespace vibrig::proto

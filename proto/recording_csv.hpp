@@ -37,12 +37,13 @@ class RecordingError : public std::runtime_error {
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
 /// ax_g, ay_g, az_g, and if it likes frequency_hz, profile, level_db and role, in any order and any
-/// case, row by row in bounded memory; other columns are ignored, and so are level_db without
-/// profile, and role where there is neither frequency_hz nor profile and none of its words is
-/// "verify" or "identify", or like them. The role "verify" holds a dwell out, "identify" or nothing
-/// does not. A profile is a name or a number; 0 or nothing: the dwell was at rest or under a sine,
-/// and at rest where frequency_hz is 0 or nothing, too. Fields are separated by commas, or by
-/// semicolons or tabs as the header says; then numbers may have decimal commas. Lines of comment
+/// case, row by row in bounded memory; other columns are ignored unless they look like
+/// frequency_hz, profile or simulated misspelt, and so are level_db without profile, and role where
+/// there is neither frequency_hz nor profile and none of its words is "verify" or "identify", or
+/// like them. The role "verify" holds a dwell out, "identify" or nothing does not. A profile is a
+/// name or a number; 0 or nothing: the dwell was at rest or under a sine, and at rest where
+/// frequency_hz is 0 or nothing, too. Fields are separated by commas, or by semicolons or tabs as
+/// the header says; then numbers may have decimal commas. Lines of comment
 /// (#) may come before the header. A (run, position) pair that comes back after another one begins
 /// a new dwell. One that begins with the times and samples of another is a copy of it, and refused.
 /// Throws RecordingError.
@@ -65,6 +66,8 @@ class RecordingReader {
     /// As the rows have named them so far.
     [[nodiscard]] const std::vector<std::string>& profiles() const;
     [[nodiscard]] std::uint64_t bytes() const;  ///< read so far
+    /// Of all rows: that the last one has no end of line. Told on standard error already.
+    [[nodiscard]] const std::string& warning() const;
 
   private:
     class Rows;

@@ -132,4 +132,11 @@ std::string read_whole_file(const std::string& path, std::size_t limit) {
     return text;
 }
 
+bool same_name(std::string_view a, std::string_view b) noexcept {
+    const auto lower = [](char c) {
+        return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    };
+    return std::ranges::equal(a, b, {}, lower, lower);
+}
+
 }  // namespace vibrig::proto

@@ -25,6 +25,9 @@ inline constexpr std::size_t kQuotedLength = 40, kLongestLine = 1000;
 [[nodiscard]] std::string_view trimmed(std::string_view field,
                                        std::string_view around = " \t\r\"") noexcept;
 
+/// Names of columns, whatever their case.
+[[nodiscard]] bool same_name(std::string_view a, std::string_view b) noexcept;
+
 /// True if all of the text is one number that the type holds, without sign '+' or spaces.
 template <typename Number>
 [[nodiscard]] bool read_number(std::string_view text, Number& out) noexcept {

@@ -233,6 +233,7 @@ AllanAnalysis analyse(const AllanRequest& asked) {
             [&](std::size_t done, std::size_t all) { progress.show(done, std::max(all, done)); });
     }
     analysis.column = file.column;
+    if (!file.warning.empty()) analysis.warnings.push_back(file.warning);
     std::vector<double> values =
         request.time.empty() ? std::move(file.values) : on_grid(file, request.file, request.tau0);
     check_range(request, values);

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "proto/open_end.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -45,7 +46,8 @@ class Parser {
     Parser(std::string path, const ColumnRequest& request)
         : path_(std::move(path)), request_(request) {}
 
-    void line(std::string_view text) {
+    /// `open`: it has no end.
+    void line(std::string_view text, bool open = false) {
         ++number_;
         if (number_ == 1 && text.substr(0, 3) == "\xEF\xBB\xBF") {
             text.remove_prefix(3);
@@ -62,6 +64,7 @@ class Parser {
         if (!known_ && first(content)) {
             return;
         }
+        if (open) check_end(content);
         file_.values.insert(file_.values.end(), std::exchange(blank_, 0U), kMissing);
         file_.values.push_back(field(text, value_, file_.column));
         if (time_ != kNoColumn) {
@@ -81,6 +84,16 @@ class Parser {
     }
 
   private:
+    void check_end(std::string_view text) {
+        std::size_t count = 0;
+        std::string_view last;
+        for (; text.data() != nullptr; ++count) last = next(text);
+        const bool read = fields_ == std::max(value_, time_ == kNoColumn ? 0 : time_) + 1;
+        const auto cut = proto::cut_fields(count, fields_, last, read);
+        if (!cut.empty()) fail(cut);
+        file_.warning = proto::tell_open_end(path_ + ":" + std::to_string(number_), last);
+    }
+
     /// Next field of `rest`, which loses it.
     std::string_view next(std::string_view& rest) const {
         if (separator_ == ' ') {
@@ -145,13 +158,18 @@ class Parser {
         }
         value_ = request_.column.empty() ? 0 : index_of(fields, request_.column);
         time_ = request_.time.empty() ? kNoColumn : index_of(fields, request_.time);
-        single_ = fields.size() == 1;
+        fields_ = fields.size();
+        single_ = fields_ == 1;
         file_.column = fields[value_];
         return header;
     }
 
     std::size_t index_of(const std::vector<std::string>& fields, const std::string& name) const {
-        const auto at = std::find(fields.begin(), fields.end(), name);
+        auto at = std::ranges::find(fields, name);
+        if (at == fields.end())
+            at = std::ranges::find_if(fields, [&name](const std::string& field) {
+                return proto::same_name(field, name);
+            });
         if (at != fields.end()) {
             return static_cast<std::size_t>(at - fields.begin());
         }
@@ -174,7 +192,7 @@ class Parser {
     ColumnFile file_;
     std::size_t number_ = 0;
     std::size_t blank_ = 0;  ///< rows since the last number
-    std::size_t value_ = 0;
+    std::size_t value_ = 0, fields_ = 0;
     std::size_t time_ = kNoColumn;
     char separator_ = ' ';
     bool single_ = false;
@@ -230,7 +248,7 @@ ColumnFile read_columns(const std::string& path, const ColumnRequest& request,
         }
         if (got == 0) {
             if (begin < text.size()) {
-                parser.line(text.substr(begin));
+                parser.line(text.substr(begin), true);
             }
             return parser.take();
         }

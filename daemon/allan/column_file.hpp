@@ -14,11 +14,13 @@ struct ColumnFile {
     std::vector<double> values;
     std::vector<double> times;  ///< if a time column was asked for
     std::string column;         ///< name, or number as text in a file without header
+    std::string warning;        ///< the last row has no end of line; told on standard error already
 };
 
 struct ColumnRequest {
-    std::string column;  ///< name or number from 1; may be empty in a file with one column
-    std::string time;    ///< likewise; empty: none
+    /// Name, whatever its case, or number from 1; may be empty in a file with one column.
+    std::string column;
+    std::string time;  ///< likewise; empty: none
 };
 
 /// "-" is standard input. `progress` gets bytes done and in all (0: unknown). Throws

@@ -50,6 +50,15 @@ std::string socket_rule(const std::string& text) {
     return good ? "" : "an absolute path or \"@name\", 2 to 107 bytes";
 }
 
+std::string socket_file_rule(const std::string& text) {
+    const bool good = socket_rule(text).empty() && text.front() == '/';
+    return good ? "" : "an absolute path, 2 to 107 bytes: its mode says who may open it";
+}
+
+std::string socket_file_or_empty_rule(const std::string& text) {
+    return text.empty() ? "" : socket_file_rule(text);
+}
+
 std::string socket_or_empty_rule(const std::string& text) {
     return text.empty() ? "" : socket_rule(text);
 }

@@ -13,6 +13,9 @@ namespace vibrig::configuration {
 /// Empty, absolute, or "@name" for the abstract name space; at most 107 bytes.
 [[nodiscard]] std::string socket_rule(const std::string& text);
 [[nodiscard]] std::string socket_or_empty_rule(const std::string& text);
+/// Absolute: an abstract name has no mode, so that anybody may open it.
+[[nodiscard]] std::string socket_file_rule(const std::string& text);
+[[nodiscard]] std::string socket_file_or_empty_rule(const std::string& text);
 /// Empty, or "HOST:PORT", "[::1]:PORT".
 [[nodiscard]] std::string endpoint_rule(const std::string& text);
 [[nodiscard]] std::string group_rule(const std::string& text);

@@ -189,15 +189,14 @@ std::vector<Key> server_keys() {
     using S = C::Server;
     const auto server = part(&C::server);
     return {
-        text("server.socket", at(&C::socket), "absolute or \"@name\"",
-             "Unix socket of the status server: a file, whose mode says who may open it; "
-             "\"@name\" is one as well, in the folder where vibrigd starts",
-             socket_rule),
+        text("server.socket", at(&C::socket), "an absolute path",
+             "Unix socket of the status server: a file, whose mode says who may open it",
+             socket_file_rule),
         text("server.operator_group", server(&S::operator_group), "a group's name",
              "who may command at the socket, besides root; empty: whoever may open it", group_rule),
-        text("server.status_socket", server(&S::status_socket), "absolute or \"@name\"",
+        text("server.status_socket", server(&S::status_socket), "an absolute path",
              "Unix socket for reading only, a file as server.socket; empty: none",
-             socket_or_empty_rule),
+             socket_file_or_empty_rule),
         text("server.page", server(&S::page),
              "\"127.0.0.1:PORT\" or \"[::1]:PORT\", port 0: any free one",
              "live page for a browser on this machine, read-only; empty: none", endpoint_rule),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -8,7 +9,8 @@
 
 namespace vibrig::plan {
 
-/// Which columns of a CSV file are looked at; none of them has to be there, others are ignored.
+/// Which columns of a CSV file are looked at, whatever the case of their names; none of them has to
+/// be there, others are ignored, unless they look like one that is not there, misspelt.
 struct TableForm {
     std::vector<std::string_view> numbers;          ///< a finite one in each row
     std::vector<std::string_view> maybe_numbers{};  ///< the same, or nothing
@@ -21,6 +23,7 @@ struct NumberTable {
     std::vector<std::vector<double>> rows;        ///< NaN in columns that are no numbers
     std::vector<std::vector<std::string>> words;  ///< of the rows; empty in columns that are none
     std::vector<std::size_t> lines;               ///< of the rows, from 1
+    std::string warning{};  ///< the last row has no end of line; told on standard error already
 
     [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const;
 };
@@ -30,6 +33,12 @@ struct NumberTable {
 /// `text` is the content of `path`. Throws PlanFileError with file, line and column.
 [[nodiscard]] NumberTable read_table(const std::string& text, const std::string& path,
                                      const TableForm& form);
+
+/// Throws PlanFileError where one of `keys` is not among `known` and looks like one of them that is
+/// not there. What resembles none, a remark of somebody's, may stand there.
+void refuse_misspelt(const std::vector<std::string_view>& keys,
+                     const std::vector<std::string_view>& known,
+                     const std::function<std::string(const std::string&)>& place_of);
 
 /// Throws PlanFileError "place: found X, expected Y".
 [[noreturn]] void refuse(const std::string& place, const std::string& found,

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "daemon/plan/number_table.hpp"
-#include "proto/edits.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::plan {
@@ -31,28 +30,23 @@ bool any_of(const std::vector<std::string_view>& names, std::string_view name) {
     return std::ranges::find(names, name) != names.end();
 }
 
-/// Throws where one of `keys` is not among `known` and is meant to be one that is not there, or to
-/// be the run's own. What resembles none, a remark of somebody's, may stand there.
+/// As refuse_misspelt(), and where one of `keys` is meant to be the run's own.
 void refuse_unknown(const std::vector<std::string_view>& keys,
                     const std::vector<std::string_view>& known, bool run,
                     const std::function<std::string(const std::string&)>& place_of) {
-    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
     constexpr std::string_view kHz = "_hz";
     const bool has_hz = std::ranges::any_of(
         keys, [&](std::string_view key) { return key.ends_with(kHz) && any_of(known, key); });
     for (const std::string_view key : keys) {
-        if (key.size() > kLongest || any_of(known, key)) continue;
+        if (any_of(known, key)) continue;
         const std::string place = place_of(proto::printable(key));
         if (run && std::ranges::find(kOfTheCampaign, key) != kOfTheCampaign.end())
             refuse(place, "one of a run",
                    "none: it is campaign." + std::string(key) + " of the configuration for all");
         if (run && key.ends_with(kHz) && !has_hz)
             refuse(place, "an unknown key", "a known one, perhaps frequency_hz");
-        for (const std::string_view name : known) {
-            if (!any_of(keys, name) && proto::edits(key, name) * kLettersPerEdit <= key.size())
-                refuse(place, "an unknown key", "a known one, perhaps " + std::string(name));
-        }
     }
+    refuse_misspelt(keys, known, place_of);
 }
 
 /// A misspelt key would leave the rig to its configuration without a word.
@@ -275,7 +269,9 @@ std::vector<std::array<double, 3>> positions_of(const NumberTable& table, const 
     for (std::size_t k = 0; k < 3; ++k) {
         const auto* name = std::array{"alpha_deg", "beta_deg", "gamma_deg"}[k];
         const auto column = table.find(name);
-        if (!column) refuse(path + ":1", "no column " + std::string(name), "one");
+        if (!column)
+            refuse(path + ":1", "no column " + std::string(name),
+                   "the columns alpha_deg, beta_deg and gamma_deg");
         for (std::size_t i = 0; i < result.size(); ++i) result[i][k] = table.rows[i][*column];
     }
     for (std::size_t i = 0; i < result.size(); ++i) {
@@ -370,8 +366,8 @@ PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_de
     return run;
 }
 
-std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
-                                      const TransmissionAt& transmission) {
+PlanFile plan_from_csv(const std::string& text, const std::string& path,
+                       const TransmissionAt& transmission) {
     // Which of the levels a row needs depends on whether it has a profile.
     const TableForm form{{"alpha_deg", "beta_deg", "gamma_deg", "count"},
                          {"level_g", "table_g", "frequency_hz", "level_db", "sweep_from_hz",
@@ -384,9 +380,9 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
     refuse_unknown({table.names.begin(), table.names.end()}, known, true,
                    [&](const std::string& name) { return path + ":1: column " + name; });
     const auto positions = positions_of(table, path);
-    std::vector<PlannedRun> result;
+    PlanFile result{{}, {}, table.warning};
     for (std::size_t i = 0; i < positions.size(); ++i)
-        result.push_back(from_csv(PlanRow(table, i, path), positions[i], transmission));
+        result.runs.push_back(from_csv(PlanRow(table, i, path), positions[i], transmission));
     return result;
 }
 
@@ -406,18 +402,13 @@ PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmiss
     const std::size_t first = text.find_first_not_of(" \t\r\n");
     PlanFile plan = first != std::string::npos && text[first] == '{'
                         ? runs_from_json(text, path, transmission, rig_hz)
-                        : PlanFile{runs_from_csv(text, path, transmission), {}};
+                        : plan_from_csv(text, path, transmission);
     std::size_t sum = 0;
     for (const PlannedRun& run : plan.runs) sum += run.count;
     if (plan.runs.empty() || sum > kMostRuns) {
         refuse(path, std::to_string(sum) + " runs", "1 to " + std::to_string(kMostRuns));
     }
     return plan;
-}
-
-std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission,
-                                  std::optional<double> rig_hz) {
-    return read_plan_file(path, transmission, rig_hz).runs;
 }
 
 std::optional<PlanMount> read_plan_mount(const std::string& path) {
@@ -441,12 +432,14 @@ std::optional<PlanMount> read_plan_mount(const std::string& path) {
     return PlanMount{*ratio(first), first["hz"].get<double>()};
 }
 
-std::vector<std::array<double, 3>> read_positions(const std::string& path) {
+std::vector<std::array<double, 3>> read_positions(const std::string& path,
+                                                  std::vector<std::string>& warnings) {
     const NumberTable table =
         read_table(content_of(path), path, {{"alpha_deg", "beta_deg", "gamma_deg"}});
     // It has these angles, too, in each of thousands of samples.
     if (table.find("time_s") && table.find("run"))
         refuse(path, "a recording (columns time_s and run)", "a position in each row");
+    if (!table.warning.empty()) warnings.push_back(table.warning);
     return positions_of(table, path);
 }
 

@@ -38,6 +38,7 @@ using TransmissionAt = std::function<std::optional<double>(std::optional<double>
 struct PlanFile {
     std::vector<PlannedRun> runs;
     std::optional<double> dwell_s;  ///< that its forecast was made for; a run has none of its own
+    std::string warning{};          ///< of NumberTable
 };
 
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; other
@@ -52,10 +53,6 @@ struct PlanFile {
 /// another frequency than `rig_hz` where runs shake at the configuration's. Throws PlanFileError.
 [[nodiscard]] PlanFile read_plan_file(const std::string& path, const TransmissionAt& transmission,
                                       std::optional<double> rig_hz = std::nullopt);
-/// The runs alone.
-[[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
-                                                const TransmissionAt& transmission,
-                                                std::optional<double> rig_hz = std::nullopt);
 
 /// What stands between table and platform by the plan's own words.
 struct PlanMount {
@@ -68,7 +65,9 @@ struct PlanMount {
 /// Where a plan's rows are judged: a profile's levels in g are 0, as at rest. Throws PlanFileError.
 void refuse_random(const std::vector<PlannedRun>& runs);
 
-/// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.
-[[nodiscard]] std::vector<std::array<double, 3>> read_positions(const std::string& path);
+/// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError. The table's warning,
+/// if there is one, goes to the end of `warnings`.
+[[nodiscard]] std::vector<std::array<double, 3>> read_positions(const std::string& path,
+                                                                std::vector<std::string>& warnings);
 
 }  // namespace vibrig::plan

@@ -14,6 +14,7 @@
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_checks.hpp"
+#include "proto/open_end.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::record {
@@ -265,10 +266,19 @@ void read_dwells(const std::string& path, Campaign& to) {
     if (!std::getline(file, line) || (line != header && !header.starts_with(line + ",")) ||
         std::ranges::count(line, ',') < kOldest)
         refuse(path + ":1", line, std::string("the header ") + kDwellsHeader);
+    const std::size_t columns = fields_of(line).size();
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::string place = fmt::format("{}:{}", path, number);
-        if (line.empty() || read_comment(line, place, to)) continue;
+        if (line.empty()) continue;
         const auto fields = fields_of(line);
+        if (file.eof()) {
+            // The recorder ends every line that it writes.
+            const auto cut = proto::cut_fields(line.starts_with('#') ? columns : fields.size(),
+                                               columns, fields.back(), true);
+            if (!cut.empty()) throw std::runtime_error(place + ": " + cut);
+            proto::tell_open_end(place, fields.back());
+        }
+        if (read_comment(line, place, to)) continue;
         Order order;
         std::int64_t offset_us = 0;
         if (!read_order(fields, order, offset_us) ||

@@ -100,6 +100,16 @@ void check(const Settings& s) {
 
 namespace {
 
+/// As the configuration has them, one of them the other way; 3: none.
+std::string listed(const std::array<SignedAxis, 3>& axes, std::size_t reversed) {
+    std::string text;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+        const bool plus = (axes[i].sign > 0) != (i == reversed);
+        text += std::string(i > 0 ? ", " : "") + (plus ? "\"+" : "\"-") + "xyz"[axes[i].axis] + '"';
+    }
+    return '[' + text + ']';
+}
+
 std::vector<DoubtfulKey> doubtful_axes(const Settings& settings) {
     constexpr std::array kKeys{"platform.gyro_x_axes", "platform.gyro_y_axes",
                                "platform.gyro_z_axes"};
@@ -121,12 +131,11 @@ std::vector<DoubtfulKey> doubtful_axes(const Settings& settings) {
         const bool cyclic = (axes[1].axis - input + 3) % 3 == 1;
         const int signs = axes[0].sign * axes[1].sign * axes[2].sign;
         if ((cyclic ? 1 : -1) * signs > 0) continue;
-        std::string found;
-        for (const SignedAxis& axis : axes)
-            found += std::string(axis.sign > 0 ? "+" : "-") + "xyz"[axis.axis] + ' ';
-        found.back() = ',';
-        doubts.push_back(
-            {key, found + " left-handed", "a right-handed triad: input cross output is spin"});
+        const std::string left = listed(axes, 3);
+        doubts.push_back({key, left + ", left-handed",
+                          "a right-handed triad, input cross output is spin: by the drawing " +
+                              listed(axes, 1) + ", " + listed(axes, 2) +
+                              ", or output and spin axis exchanged"});
     }
     return doubts;
 }

@@ -130,6 +130,23 @@ void check_points(const Breakpoints& points, const std::string& place, Points wh
 
 }  // namespace
 
+void refuse_one_frequency_twice(const Breakpoints& sines, const std::string& place) {
+    // Closer ones beat with a period longer than a dwell.
+    constexpr double kSame = 1e-4;
+    std::vector<std::pair<double, std::size_t>> sorted;
+    for (std::size_t i = 0; i < sines.size(); ++i) sorted.emplace_back(sines[i].first, i);
+    std::ranges::sort(sorted);
+    for (std::size_t k = 1; k < sorted.size(); ++k) {
+        const auto [low, high] = std::minmax(sorted[k - 1].second, sorted[k].second);
+        if (sorted[k].first - sorted[k - 1].first > kSame * sorted[k].first) continue;
+        throw SettingsError(
+            place + "[" + std::to_string(high) + "]: found " + text_of(sines[high].first) +
+            " Hz as in [" + std::to_string(low) + "], expected one sine of that frequency with " +
+            "the peak of their sum, " + text_of(sines[low].second + sines[high].second) +
+            " g where they are in phase or their phase is not known");
+    }
+}
+
 bool AxesPsd::stated() const noexcept {
     return std::ranges::any_of(psd, [](const auto& points) { return !points.empty(); }) ||
            std::ranges::any_of(cross, [](const auto& points) { return !points.empty(); });
@@ -155,6 +172,7 @@ void check(const Profile& profile, const std::string& path) {
         throw SettingsError(path + "psd: found it along one line and along axes, expected either");
     spectrum(profile.psd, "psd", Points::density);
     check_points(profile.sines, path + "sines", Points::sine);
+    refuse_one_frequency_twice(profile.sines, path + "sines");
     for (std::size_t k = 0; k < 3; ++k) {
         spectrum(profile.axes.psd[k], std::string("psd.") + kAxes[k], Points::density);
         spectrum(profile.axes.cross[k], std::string("cross.") + kAxisPairs[k], Points::cross);

@@ -43,6 +43,10 @@ struct Profile {
 /// before it, such as "profile.json: ".
 void check(const Profile& profile, const std::string& path = {});
 
+/// Powers are added, which of two sines (Hz, g peak) of one frequency holds in no phase but one.
+/// Throws SettingsError with `place` before their number.
+void refuse_one_frequency_twice(const Breakpoints& sines, const std::string& place);
+
 /// Mean square of the whole profile, all axes together, g^2.
 [[nodiscard]] double mean_square(const Profile& profile);
 

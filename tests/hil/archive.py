@@ -137,11 +137,13 @@ def moves(checks, rig, lab, base):
 
 def browsed(checks, lab, folder):
     """As a browser shows it; the door picks its port."""
-    server = r.Child("serve", [lab.program, "archive", "serve", *lab.where(), "--page", "127.0.0.1:0"], folder)
+    server = r.Child("serve", [lab.program, "archive", "serve", *lab.where(), "--page", "127.0.0.1:0", "--json"], folder)
     end = time.monotonic() + 10
-    while "archive: " not in server.text() and time.monotonic() < end:
+    while "}\n" not in server.text() and time.monotonic() < end:
         time.sleep(0.05)
-    page = server.text().split("archive: ")[-1].strip()
+    where = json.loads(server.text())
+    page = where["page"]
+    checks.check(page.startswith("http://127.0.0.1:") and where["remote"] is None, "it says as JSON where it is", where)
 
     def shown(path):
         # Nothing of the browser's own may go out, and it is to be alone.

@@ -219,8 +219,10 @@ def whole(checks, programs, folder, seed):
         os.mkdir(os.path.dirname(real))
         os.rename(u.rig.configuration, real)
         os.symlink(real, u.rig.configuration)
-        accepted = tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
-        checks.check(accepted.returncode == 0 and os.path.exists(u.record), "accepted by two", accepted.stdout + accepted.stderr)
+        accepted = tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes", "--json")
+        outcome = json.loads(accepted.stdout or "{}")
+        checks.check(accepted.returncode == 0 and os.path.exists(u.record) and outcome["outcome"] == "accepted" and
+                     outcome["changed"] and os.path.exists(outcome["as_it_was"]), "accepted by two", accepted.stdout + accepted.stderr)
         with open(u.record, encoding="utf-8") as file:
             known = json.load(file)["parts"]["bus"]["evidence"]["bits"]
         checks.check(known["PlatformStatus.LoopClosed"]["proven"] == "changed once and back" and known["PlatformStatus.LoopClosed"]["by"] == ["Ada"] and
@@ -1021,7 +1023,7 @@ def dialogue(checks, programs, folder):
         u.configure(platform={"gyro_y_axes": ["+x", "+y", "+z"], "gyro_z_axes": ["+z", "+y", "+x"]})
         check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)
         u.restart()
-        warned = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
+        warned = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', 'platform.gyro_z_axes: found ["+z", "+y", "+x"], left-handed')
         checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and u.rig.daemon.says(each) for each in warned),
                      "gyro axes that are hardly meant are reported by --check and at the start", check.stderr + u.rig.logs())
     finally:

@@ -10,7 +10,9 @@
 #include <ostream>
 #include <sstream>
 
+#include "proto/open_end.hpp"
 #include "proto/register_map.hpp"
+#include "proto/text.hpp"
 #include "tests/plant/rig.hpp"
 
 namespace vibrig::plant {
@@ -142,10 +144,11 @@ std::vector<Vec3> read_positions(const std::string& name) {
         const std::vector<std::string> fields = split(line);
         if (fields.empty() || (fields.size() == 1 && fields[0].empty())) continue;
         const std::string place = name + ":" + std::to_string(number) + ": ";
+        if (in.eof()) proto::tell_open_end(name + ":" + std::to_string(number), fields.back());
         if (!column[0]) {
             for (std::size_t i = 0; i < 3; ++i) {
                 for (std::size_t c = 0; c < fields.size(); ++c) {
-                    if (fields[c] == names[i]) column[i] = c;
+                    if (proto::same_name(fields[c], names[i])) column[i] = c;
                 }
                 if (!column[i])
                     throw PlantError(place + "no column " + names[i] + " in the header");
@@ -258,7 +261,8 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
     const bool random = !plan.profile.empty();
     const bool several = plan.frequency_hz.size() > 1 || random || !plan.sweep.empty();
     out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g"
-        << (several ? ",frequency_hz" : "") << (random ? ",profile,level_db\n" : "\n");
+        << (several ? ",frequency_hz" : "") << (random ? ",profile,level_db" : "")
+        << ",simulated\n";
     std::array<GyroCoefficients, 3> sum{};
     const auto write = [&](const PlannedSample& s) {
         std::array<char, 400> row{};
@@ -274,16 +278,16 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
             *at++ = ',';
         }
         for (const double angle : s.readings.encoder_deg) fixed(angle, 7, ',');
-        for (std::size_t i = 0; i < 3; ++i)
-            fixed(s.readings.raw_g[i], 7, i < 2 || several ? ',' : '\n');
+        for (const double force : s.readings.raw_g) fixed(force, 7, ',');
         const bool sine = plan.table_g[s.run - 1] > 0 && plan.profile_of(s.run) == 0;
-        if (several)
-            fixed(s.hz > 0 ? s.hz : (sine ? plan.hz_of(s.run) : 0), 4, random ? ',' : '\n');
+        if (several) fixed(s.hz > 0 ? s.hz : (sine ? plan.hz_of(s.run) : 0), 4, ',');
         if (random) {
             at = std::to_chars(at, end, plan.profile_of(s.run)).ptr;
             *at++ = ',';
-            fixed(level_db(truth, plan, s.run), 1, '\n');
+            fixed(level_db(truth, plan, s.run), 1, ',');
         }
+        *at++ = '1';
+        *at++ = '\n';
         out.write(row.data(), at - row.data());
         for (std::size_t g = 0; g < 3; ++g) {
             for (std::size_t t = 0; t < kTerms; ++t) sum[g][t] += s.coefficients[g][t];

@@ -74,9 +74,9 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
                        const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 /// Writes the recording as CSV (time_s, run, position, alpha_deg ... az_g, and with a frequency for
-/// each run frequency_hz, and where one is random profile, its number or 0, and level_db). Returns
-/// the number of samples. `progress` hears of every finished dwell. `mean` becomes the
-/// coefficients' mean over all samples.
+/// each run frequency_hz, and where one is random profile, its number or 0, and level_db; last the
+/// mark `simulated`, as proto::write_recording() has it). Returns the number of samples. `progress`
+/// hears of every finished dwell. `mean` becomes the coefficients' mean over all samples.
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
                      std::array<GyroCoefficients, 3>* mean = nullptr,
                      const std::function<void(std::size_t done, std::size_t all)>& progress = {});

@@ -10,6 +10,7 @@
 #include "daemon/allan/analysis.hpp"
 #include "daemon/results/text_line.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/open_end.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -87,6 +88,7 @@ bool allan_live(const AllanRequest& request, bool json, const std::string& page)
     auto next_page = std::chrono::steady_clock::now();
     std::size_t number = 0;
     for (std::string line; std::getline(std::cin, line);) {
+        if (std::cin.eof()) proto::tell_open_end("-:" + std::to_string(number + 1), line);
         if (!dynamic.add(live_sample(line, ++number) * to_deg_h)) continue;
         const allan::WindowRow row = dynamic.row();
         const auto alarms = monitor.check(row);

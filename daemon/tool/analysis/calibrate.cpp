@@ -63,11 +63,14 @@ planning::Reading reading_at(const std::string& place, const std::array<double, 
 void read(const Options& options, Study& study) {
     const auto table = plan::read_table(plan::content_of(options.file), options.file,
                                         {{"x1", "x2", "x3", "y", "sigma", "count"}});
+    if (!table.warning.empty()) study.warnings.push_back(table.warning);
     std::array<std::size_t, 4> column{};
     for (std::size_t k = 0; k < column.size(); ++k) {
         const auto* name = std::array{"x1", "x2", "x3", "y"}[k];
         const auto found = table.find(name);
-        if (!found) plan::refuse(options.file + ":1", "no column " + std::string(name), "one");
+        if (!found)
+            plan::refuse(options.file + ":1", "no column " + std::string(name),
+                         "the columns x1, x2, x3 and y, and sigma and count if known");
         column[k] = *found;
     }
     const auto sigma = table.find("sigma"), count = table.find("count");

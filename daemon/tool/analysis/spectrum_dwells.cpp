@@ -50,6 +50,7 @@ StatedSpectrum stated_of(const SpectraJson& entry, const std::string& place) {
     int count = 0;
     if (const auto found = entry.find("lines"); found != entry.end()) {
         of.lines = pairs_of(*found, place + "lines", "[hz, g_peak]");
+        estimator::spectrum::refuse_one_frequency_twice(of.lines, place + "lines");
         ++count;
     }
     if (const auto found = entry.find("psd"); found != entry.end()) {

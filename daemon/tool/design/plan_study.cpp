@@ -96,17 +96,19 @@ class Study {
                         ? mount.transmission(c_.estimator.frequency_hz).value_or(reference)
                         : said->transmission;
     }
-    [[nodiscard]] std::vector<Vec3> positions_in(const std::string& path) const {
-        auto positions = plan::read_positions(path);
+    [[nodiscard]] std::vector<Vec3> positions_in(const std::string& path) {
+        auto positions = plan::read_positions(path, out_.warnings);
         for (Vec3& position : positions) position = to_readings(c_.estimator, position);
         return positions;
     }
-    [[nodiscard]] std::vector<plan::PlannedRun> plan_in(const std::string& path) const {
+    [[nodiscard]] std::vector<plan::PlannedRun> plan_in(const std::string& path) {
         const auto transmission = [this](std::optional<double> hz) {
             return hz ? c_.spectrum.mount.transmission(*hz)
                       : std::optional(c_.estimator.transmission);
         };
-        auto runs = plan::read_plan(path, transmission, c_.estimator.frequency_hz);
+        auto [runs, dwell_s, warning] =
+            plan::read_plan_file(path, transmission, c_.estimator.frequency_hz);
+        if (!warning.empty()) out_.warnings.push_back(warning);
         plan::refuse_random(runs);
         for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
         return runs;

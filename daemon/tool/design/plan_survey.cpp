@@ -70,7 +70,7 @@ class SurveyPlan {
     void choose_positions() {
         std::vector<Vec3> listed;
         if (!request_.positions.empty()) {
-            for (const Vec3& p : plan::read_positions(request_.positions))
+            for (const Vec3& p : plan::read_positions(request_.positions, warnings_))
                 listed.push_back(to_readings(c_.estimator, p));
         } else {
             listed = c_.campaign.positions_deg;

@@ -439,6 +439,8 @@ void add_commission(CLI::App& app, int& exit_code) {
         "--bus", accepted->bus,
         "Of vibrig commission bus --find: can.* only, without a daemon, into --config");
     accepting.add_flag("--yes", accepted->yes, "Do not ask");
+    accepting.add_flag("--json", accepted->json,
+                       "The outcome as JSON; what is said and asked goes to standard error");
     accepting.footer("Example: vibrig commission accept --by 'Ada Lovelace' --second 'Bo Ek'");
     run_as(accepting, exit_code, accepted, accept_commission);
 

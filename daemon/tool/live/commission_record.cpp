@@ -14,6 +14,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/tool/live/commission_client.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -30,22 +31,58 @@ std::string text_of_file(const std::string& path) {
     }
 }
 
+/// What is said and asked: with --json standard output has the outcome alone.
+std::ostream& aside(const CommissionOptions& options) {
+    return options.json ? std::cerr : std::cout;
+}
+
 bool agreed(const CommissionOptions& options, const std::string& question) {
     if (options.yes) return true;
-    std::cout << "? " << question << " [yes or no]\n> " << std::flush;
+    aside(options) << "? " << question << " [yes or no]\n> " << std::flush;
     std::string line;
     return std::getline(std::cin, line) && (line == "yes" || line == "y");
 }
 
-/// What was there is kept beside the file itself, not beside a link to it.
-void save_file(const std::string& path, const std::string& before, const std::string& text) {
+/// What was there is kept beside the file itself, not beside a link to it. Returns where.
+std::string save_file(std::ostream& out, const std::string& path, const std::string& before,
+                      const std::string& text) {
     const std::string real = std::filesystem::canonical(path).string();
     std::string kept = real + ".1";
     for (int n = 2; std::filesystem::exists(kept); ++n) kept = real + "." + std::to_string(n);
     proto::write_durably(kept, before, 0600);
     std::filesystem::permissions(kept, std::filesystem::status(real).permissions());
     proto::write_durably(path, text);
-    print_wrapped(std::cout, path + " is written; as it was: " + kept);
+    print_wrapped(out, path + " is written; as it was: " + kept);
+    return kept;
+}
+
+/// Those of `values` that the configuration does not say yet; each is printed and, as JSON,
+/// `listed`.
+std::vector<TomlValue> changed_of(std::vector<TomlValue> values, const configuration::Loaded& now,
+                                  std::ostream& out, CommissionJson& listed) {
+    std::vector<TomlValue> changed;
+    for (auto& value : values) {
+        const auto at =
+            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
+        const std::string was = at == now.effective.end() ? "nothing" : at->value;
+        // 1 and 1.0 are one value.
+        const auto meant = CommissionJson::parse(value.value, nullptr, false);
+        if (was == value.value ||
+            (!meant.is_discarded() && CommissionJson::parse(was, nullptr, false) == meant))
+            continue;
+        print_wrapped(out, "- " + value.key + " = " + was);
+        print_wrapped(out, "+ " + value.key + " = " + value.value);
+        listed.push_back({{"key", value.key}, {"was", was}, {"is", value.value}});
+        changed.push_back(std::move(value));
+    }
+    return changed;
+}
+
+/// Last, once all is done.
+int accepted_as(const CommissionOptions& options, CommissionJson outcome) {
+    outcome["outcome"] = "accepted";
+    if (options.json) std::cout << proto::json_text(outcome, 1) << '\n';
+    return 0;
 }
 
 /// Before anything is written or asked.
@@ -75,8 +112,9 @@ void sign_recorded(serve::Client& client, const CommissionOptions& options,
         digests[commission::part_named(name).value()] = record["parts"][name]["digest"];
     const auto cms =
         signed_by(options, commission::statement_of(record["rig"].get<std::string>(), digests));
-    print_wrapped(std::cout, commission_command(client, options.by,
-                                                {{"do", "sign"}, {"parts", parts}, {"cms", cms}}));
+    print_wrapped(
+        aside(options),
+        commission_command(client, options.by, {{"do", "sign"}, {"parts", parts}, {"cms", cms}}));
 }
 
 /// A line of a person, with blanks around it taken off.
@@ -132,7 +170,7 @@ CommissionJson confirmed_bits(serve::Client& client, const CommissionOptions& op
     const auto none = CommissionJson::array();
     std::string names;
     for (const auto& name : left) names += " " + name.get<std::string>();
-    print_wrapped(std::cout, "never changed, unproven:" + names);
+    print_wrapped(aside(options), "never changed, unproven:" + names);
     if (options.yes && state["simulated"] != true) return none;
     return agreed(options, options.by + " and " + options.second +
                                ": by the maker's paper, is each what it is called?")
@@ -166,27 +204,21 @@ int accept_bus(const CommissionOptions& options) {
     const std::string before = text_of_file(path);
     const auto now = configuration::parse(before, path, false);
     const auto found = std::filesystem::path(now.configuration.commission.folder) / "found.toml";
-    std::vector<TomlValue> changed;
-    for (auto& value : values_in(text_of_file(found.string()), found.string())) {
+    auto values = values_in(text_of_file(found.string()), found.string());
+    for (const auto& value : values)
         if (!value.key.starts_with("can."))
             throw std::runtime_error(found.string() + ": found " + value.key +
                                      ", expected what vibrig commission bus --find wrote");
-        const auto at =
-            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
-        const std::string was = at == now.effective.end() ? "nothing" : at->value;
-        if (was == value.value) continue;
-        print_wrapped(std::cout, "- " + value.key + " = " + was);
-        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
-        changed.push_back(std::move(value));
-    }
+    CommissionJson outcome{{"configuration", path}, {"changed", CommissionJson::array()}};
+    const auto changed = changed_of(std::move(values), now, aside(options), outcome["changed"]);
     if (changed.empty()) throw CommissionRefused(path + " says so already: nothing is written");
     const std::string after = with_values(before, path, changed);
     // Before it takes the place of one that works.
     static_cast<void>(configuration::parse(after, path, false));
     if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
         throw CommissionRefused("not accepted: nothing is written");
-    save_file(path, before, after);
-    return 0;
+    outcome["as_it_was"] = save_file(aside(options), path, before, after);
+    return accepted_as(options, std::move(outcome));
 }
 
 int accept_commission(const CommissionOptions& options) {
@@ -208,36 +240,30 @@ int accept_commission(const CommissionOptions& options) {
         throw CommissionRefused("the DBC first, then commission anew: " +
                                 result["corrections"][0].get<std::string>());
     const std::string before = text_of_file(path);
-    std::vector<TomlValue> changed;
-    const auto now = configuration::load(path, true);
-    for (auto& value : values_of(result["found"], result["found_by"], mark_of(state))) {
-        const auto at =
-            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
-        std::string found = at == now.effective.end() ? "nothing" : at->value;
-        if (CommissionJson::parse(found, nullptr, false) ==
-            CommissionJson::parse(value.value, nullptr, false))
-            continue;
-        print_wrapped(std::cout, "- " + value.key + " = " + found);
-        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
-        changed.push_back(std::move(value));
-    }
+    CommissionJson outcome{{"configuration", path}, {"changed", CommissionJson::array()}};
+    const auto changed =
+        changed_of(values_of(result["found"], result["found_by"], mark_of(state)),
+                   configuration::load(path, true), aside(options), outcome["changed"]);
     if (!changed.empty()) {
         const std::string after = with_values(before, path, changed);
         // Before it takes the place of one that works.
         static_cast<void>(configuration::parse(after, path, true));
         if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
             throw CommissionRefused("not accepted: nothing is written");
-        save_file(path, before, after);
+        outcome["as_it_was"] = save_file(aside(options), path, before, after);
     } else if (!agreed(options, options.by + " and " + options.second + ": record it?")) {
         throw CommissionRefused("not accepted");
     }
-    print_wrapped(std::cout,
-                  commission_command(client, options.by,
-                                     {{"do", "accept"},
-                                      {"second", options.second},
-                                      {"confirmed_bits", confirmed_bits(client, options, state)}}));
+    const auto answer =
+        commission_command(client, options.by,
+                           {{"do", "accept"},
+                            {"second", options.second},
+                            {"confirmed_bits", confirmed_bits(client, options, state)}});
+    print_wrapped(aside(options), answer);
+    outcome["message"] = answer;
+    outcome["simulated"] = state.value("simulated", false);
     sign_recorded(client, options, {"bus", "gimbals", "accelerometers", "earth"});
-    return 0;
+    return accepted_as(options, std::move(outcome));
 }
 
 int state_gyros(const CommissionOptions& options) {

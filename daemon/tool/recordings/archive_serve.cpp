@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/serve/status_server.hpp"
@@ -10,6 +11,7 @@
 #include "daemon/tool/recordings/archive_pages.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/result.hpp"
+#include "proto/json_text.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -40,7 +42,22 @@ class NoRig final : public StatusSource {
 struct ServeOptions {
     serve::ServerSettings server = {};
     ArchiveOptions where = {};
+    bool json = false;
 };
+
+/// One line: whoever started it reads it and goes on.
+void print_addresses(const std::string& page, const std::string& remote, bool json) {
+    if (json) {
+        nlohmann::ordered_json where{{"page", nullptr}, {"remote", nullptr}};
+        if (!page.empty()) where["page"] = page;
+        if (!remote.empty()) where["remote"] = remote;
+        std::cout << proto::json_text(where) << std::endl;
+        return;
+    }
+    if (!page.empty()) std::cout << "archive: " << page << '\n';
+    if (!remote.empty()) std::cout << "archive, with certificates: " << remote << '\n';
+    std::cout << std::flush;
+}
 
 /// As vibrigd's server.page and server.remote, whose server takes the port as it comes.
 void check_port(const char* option, const std::string& address) {
@@ -93,11 +110,7 @@ int serve_archive(const ServeOptions& options) {
     };
     serve::StatusServer server(source, settings);
     server.answer();
-    if (const auto page = server.page_address(); !page.empty())
-        std::cout << "archive: " << page << '\n';
-    if (const auto remote = server.remote_address(); !remote.empty())
-        std::cout << "archive, with certificates: " << remote << '\n';
-    std::cout << std::flush;
+    print_addresses(server.page_address(), server.remote_address(), options.json);
     int signal = 0;
     ::sigwait(&signals, &signal);
     return 0;
@@ -123,6 +136,7 @@ void add_archive_serve(CLI::App& group, int& exit_code) {
     command.add_option("--revoked", options.server.revoked,
                        "certificates that no longer count, PEM (default: of --config)");
     add_archive_options(command, options.where);
+    command.add_flag("--json", options.json, "print the addresses as one line of JSON");
     command.footer(
         "Example: vibrig archive serve --archive /lab/archive\n"
         "Ends with SIGINT or SIGTERM.\n"

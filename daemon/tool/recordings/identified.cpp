@@ -530,6 +530,7 @@ Identified identify_recording(const std::string& file, const std::string& config
         } else {
             found = identify(reader, unknown ? 0 : size, rig, file, request.held_out);
         }
+        if (!reader.warning().empty()) found.result.warnings.push_back(reader.warning());
         if (request.held_out) identified.held_out = held_out_of(found);
     }
     identified.result = std::move(found.result);

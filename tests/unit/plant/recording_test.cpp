@@ -27,7 +27,7 @@ TEST(Recording, HasTheColumnsDwellsAndLevelsOfThePlan) {
     std::istringstream in(recorded(5));
     std::string line;
     ASSERT_TRUE(std::getline(in, line));
-    EXPECT_EQ(line, "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g");
+    EXPECT_EQ(line, "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g,simulated");
     std::map<std::pair<int, int>, int> samples;
     std::map<std::pair<int, int>, double> kappa;
     double last_time = -1;
@@ -37,6 +37,7 @@ TEST(Recording, HasTheColumnsDwellsAndLevelsOfThePlan) {
         ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%d,%d,%lf,%lf,%lf,%lf,%lf,%lf", &t, &run,
                               &position, &alpha, &beta, &gamma, &x, &y, &z),
                   9);
+        EXPECT_TRUE(line.ends_with(",1")) << line;
         EXPECT_GT(t, last_time);
         last_time = t;
         ++samples[{run, position}];

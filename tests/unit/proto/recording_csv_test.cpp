@@ -421,6 +421,44 @@ TEST_F(Recording, RefusesWhatIsNoText) {
               ":3: column az_g: found '\\xff\\x1b[2J', expected a finite number");
 }
 
+TEST_F(Recording, WithoutAnEndIsToldAndRefusedWhereItIsCut) {
+    const auto warning = [&](const std::string& text) {
+        RecordingReader reader(write(text));
+        for (RecordingRow row; reader.next(row);) continue;
+        return reader.warning();
+    };
+    const std::string whole = std::string(kHeader) + "0,1,1,0,0,0,0,0,0.01234\n";
+    EXPECT_EQ(warning(whole), "");
+    EXPECT_EQ(warning(whole.substr(0, whole.size() - 4)),
+              path() +
+                  ":2: found no end of line behind '0.01', expected one: the file may have "
+                  "been cut, within this field even");
+    EXPECT_EQ(error(whole + "1,1,1,0,0"),
+              ":3: found 5 fields and no end of line, expected 9: the file was cut");
+    // Of rest `frequency_hz` may be empty, where the line ends.
+    const std::string sine =
+        std::string(kHeader).substr(0, std::string(kHeader).size() - 1) + ",frequency_hz\n";
+    EXPECT_EQ(warning(sine + "0,1,1,0,0,0,0,0,0,\n"), "");
+    EXPECT_EQ(error(sine + "0,1,1,0,0,0,0,0,0,"),
+              ":2: found nothing in the last field and no end of line, expected both: the file "
+              "was cut");
+    EXPECT_NE(warning(sine + "0,1,1,0,0,0,0,0,0,1"), "") << "of 15 Hz";
+}
+
+TEST_F(Recording, RefusesWhatIsHardlyAnythingButAMisspeltColumn) {
+    const auto named = [&](const std::string& name) {
+        const std::string header = kHeader;
+        return error(header.substr(0, header.size() - 1) + ',' + name + "\n0,1,1,0,0,0,0,0,0,15\n");
+    };
+    EXPECT_EQ(named("Freqency_Hz"),
+              ":1: column Freqency_Hz: found an unknown name, perhaps for frequency_hz, expected "
+              "one of time_s, run, position, alpha_deg, beta_deg, gamma_deg, ax_g, ay_g, az_g, "
+              "frequency_hz, profile, level_db, role, simulated, or one that is unlike them");
+    EXPECT_NE(named("simulatd"), "no error");
+    for (const char* const other : {"roll", "level_dB", "note", " FREQUENCY_HZ ", "temperature_c"})
+        EXPECT_EQ(named(other), "no error") << other;
+}
+
 TEST_F(Recording, ReadsLinesAcrossItsBufferUnchanged) {
     // GIVEN more text than the reader holds at a time, in lines that its buffer's end cuts
     std::string text = kHeader;

@@ -104,15 +104,26 @@ TEST(RealRig, TwoGyrosOnOneInputAxisAreRefused) {
 
 TEST(RealRig, ALeftHandedTriadIsRefused) {
     const std::string axes = "platform.gyro_z_axes = [\"+z\", \"+y\", \"+x\"]\n";
-    EXPECT_THAT(real_complaint(axes + kMap),
-                AllOf(HasSubstr("platform.gyro_z_axes: found +z +y +x, left-handed"),
-                      HasSubstr("right-handed")));
+    EXPECT_THAT(
+        real_complaint(axes + kMap),
+        HasSubstr(R"(platform.gyro_z_axes: found ["+z", "+y", "+x"], left-handed, expected )"
+                  R"(a right-handed triad, input cross output is spin: by the drawing )"
+                  R"(["+z", "-y", "+x"], ["+z", "+y", "-x"], or output and spin )"
+                  R"(axis exchanged)"));
     EXPECT_THAT(warnings(parse(as_simulated(axes, true), "rig.toml", true)),
-                ElementsAre(AllOf(HasSubstr("rig.toml:1: platform.gyro_z_axes: found +z +y +x, "),
+                ElementsAre(AllOf(HasSubstr("rig.toml:1: platform.gyro_z_axes: found "),
                                   HasSubstr("left-handed"))));
     EXPECT_THAT(warnings(parse(as_simulated("", true), "rig.toml", true)), IsEmpty());
+    // THEN what it proposes is taken, each of it
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"+z\", \"-y\", \"+x\"]\n" + kMap), "");
+    EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"+z\", \"+y\", \"-x\"]\n" + kMap), "");
+    EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"+z\", \"+x\", \"+y\"]\n" + kMap), "");
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"-z\", \"+y\", \"+x\"]\n" + kMap), "");
+}
+
+TEST(RealRig, ALeftHandedTriadOfAccelerometersIsDescribedByItsMatrix) {
+    EXPECT_EQ(real_complaint("accelerometer.matrix = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n" + kMap),
+              "");
 }
 
 TEST(RealRig, MotionAcrossTheVerticalIsMeasuredOrDeclared) {

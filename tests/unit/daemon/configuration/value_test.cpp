@@ -60,7 +60,16 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"can.path = \"run/bus\"",
                 "found \"run/bus\", expected an absolute path or \"@name\", 2 to 107 bytes"},
         Mistake{"server.socket = \"\"",
-                "found \"\", expected an absolute path or \"@name\", 2 to 107 bytes"},
+                "found \"\", expected an absolute path, 2 to 107 bytes: its mode says who may open "
+                "it"},
+        Mistake{
+            "server.socket = \"@vibrig\"",
+            "found \"@vibrig\", expected an absolute path, 2 to 107 bytes: its mode says who may "
+            "open it"},
+        Mistake{
+            "server.status_socket = \"@status\"",
+            "found \"@status\", expected an absolute path, 2 to 107 bytes: its mode says who may "
+            "open it"},
         Mistake{"can.signals.outer = \"Outer\"",
                 "found \"Outer\", expected \"Message.Signal\", or \"\" for not bound"},
         Mistake{"gimbal.message = \"\"",

@@ -112,6 +112,26 @@ TEST_F(DwellsCsv, WhatIsNoNumberIsRefused) {
                  std::runtime_error);
 }
 
+TEST_F(DwellsCsv, ALastLineWithoutAnEndIsToldOrRefused) {
+    const std::string good = order_line(full_order(), kOffset_ns);
+    const auto told = [&](const std::string& lines) {
+        testing::internal::CaptureStderr();
+        static_cast<void>(read(lines));
+        return testing::internal::GetCapturedStderr();
+    };
+    EXPECT_EQ(told(good), "");
+    // 27.5 s
+    EXPECT_THAT(told(good + good.substr(0, good.size() - 2)),
+                testing::HasSubstr("dwells.csv:3: found no end of line behind '27.'"));
+    EXPECT_THAT(told(good + "# restart after dwells: 1"), testing::HasSubstr("no end of line"));
+    // As wide as a file of before
+    std::string old = good;
+    while (std::ranges::count(old, ',') > 24) old.erase(old.rfind(','));
+    EXPECT_THAT([&] { static_cast<void>(read(good + old)); },
+                testing::ThrowsMessage<std::runtime_error>(
+                    testing::HasSubstr("dwells.csv:3: found 25 fields and no end of line")));
+}
+
 TEST_F(DwellsCsv, SweepsAndRestartsStandBetweenTheOrders) {
     const std::string order = order_line(full_order(), kOffset_ns);
     const std::string swept = swept_line({{{5'100'000'123, 2, 3, 40.5}}}, kOffset_ns);

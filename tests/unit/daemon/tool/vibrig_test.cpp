@@ -263,6 +263,26 @@ TEST_F(VibrigOptions, CommissioningNamesWhatItCannotTake) {
                        "--baud: Value " + std::string(baud) + " not in range 300 to 4000000");
 }
 
+TEST_F(VibrigOptions, CommissioningAcceptsInJson) {
+    write("rig.toml",
+          "[can]\nsample_rate_hz = 20\n[commission]\nfolder = \"" + folder_.string() + "\"\n");
+    write("found.toml", "[can]\nsample_rate_hz = 40\n");
+    const std::string command = "commission accept --bus --json --config rig.toml --by Ada";
+    EXPECT_EQ(vibrig(command + " --second ada --yes"), 1);
+    EXPECT_EQ(nlohmann::json::parse(out)["outcome"], "refused");
+    ASSERT_EQ(vibrig(command + " --second Bo --yes"), 0) << error;
+    // THEN people read at standard error what programs find in the outcome
+    EXPECT_THAT(error, testing::HasSubstr("+ can.sample_rate_hz = 40"));
+    const auto outcome = nlohmann::json::parse(out);
+    EXPECT_EQ(outcome["outcome"], "accepted");
+    EXPECT_EQ(outcome["configuration"], "rig.toml");
+    ASSERT_EQ(outcome["changed"].size(), 1U);
+    EXPECT_EQ(outcome["changed"][0]["key"], "can.sample_rate_hz");
+    EXPECT_EQ(outcome["changed"][0]["is"], "40");
+    EXPECT_THAT(content(std::filesystem::path(std::string(outcome["as_it_was"])).filename()),
+                testing::HasSubstr("sample_rate_hz = 20"));
+}
+
 TEST_F(VibrigOptions, EachProgramSaysWhenNobodyCanReadWhatItPrints) {
     write("rig.toml",
           "clock.source = \"rig\"\ncan.port = \"seqpacket\"\ncan.path = \"@rig\"\n"

@@ -70,6 +70,15 @@ TEST(Profiles, ThatCannotBeAreRefusedByElementAndValue) {
     EXPECT_NE(refusal({"", {}, {{-5, 1}}, {0, 1, 0}, 0}).find("sines[0]"), std::string::npos);
 }
 
+TEST(Profiles, OneFrequencyIsOneSine) {
+    // Of two in phase the mean square is (3 + 2)^2 / 2, not 3^2 / 2 + 2^2 / 2.
+    EXPECT_EQ(refusal({"", {}, {{55, 3}, {20, 1}, {55, 2}}, {0, 1, 0}, 0}),
+              "p.json: sines[2]: found 55 Hz as in [0], expected one sine of that frequency with "
+              "the peak of their sum, 5 g where they are in phase or their phase is not known");
+    EXPECT_NE(refusal({"", {}, {{55.001, 3}, {55, 2}}, {0, 1, 0}, 0}), "") << "they beat in 1000 s";
+    EXPECT_EQ(refusal({"", {}, {{55.1, 3}, {55, 2}}, {0, 1, 0}, 0}), "");
+}
+
 TEST(Sampling, WholeFrequenciesThatAreClosedAreThePublishedOnes) {
     const auto closed = [](double sample_hz) {
         std::vector<int> out;

@@ -56,6 +56,33 @@ TEST_F(AllanCommand, PrintsTheHandbookNumbersAsJson) {
     }
 }
 
+TEST_F(AllanCommand, ALastLineWithoutAnEndIsToldOrRefused) {
+    const std::string plain = noise(500, 1);
+    std::string csv = "Time_s,Rate\n";
+    std::istringstream lines(plain);
+    std::size_t i = 0;
+    for (std::string line; std::getline(lines, line); ++i)
+        csv += std::to_string(static_cast<double>(i) * 0.5) + ',' + line + '\n';
+    write("whole.csv", csv);
+    ASSERT_EQ(vibrig("allan whole.csv --column rate --time TIME_S --json"), 0) << error;
+    EXPECT_EQ(error, "");
+    const auto warnings = Json::parse(out)["warnings"].size();
+    write("cut.csv", csv.substr(0, csv.size() - 3));
+    ASSERT_EQ(vibrig("allan cut.csv --column rate --time time_s --json"), 0) << error;
+    EXPECT_NE(error.find("warning: cut.csv:501: found no end of line behind '"), std::string::npos)
+        << error;
+    ASSERT_EQ(Json::parse(out)["warnings"].size(), warnings + 1) << out;
+    EXPECT_NE(std::string(Json::parse(out)["warnings"][0]).find("no end of line"),
+              std::string::npos);
+    write("fields.csv", csv + "250.5");
+    EXPECT_EQ(vibrig("allan fields.csv --column rate --tau0 0.5"), 2);
+    EXPECT_NE(error.find("fields.csv:502: found 1 fields and no end of line, expected 2"),
+              std::string::npos)
+        << error;
+    write("empty.csv", csv + "250.5,");
+    EXPECT_EQ(vibrig("allan empty.csv --column rate --tau0 0.5"), 2) << "missing, or cut off";
+}
+
 TEST_F(AllanCommand, EveryFormOfInputGivesTheSame) {
     // GIVEN one record as text, CSV with names, semicolons, CRLF, blanks, and gzip
     const std::string plain = noise(500, 1);

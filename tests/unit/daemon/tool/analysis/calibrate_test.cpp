@@ -53,6 +53,26 @@ class CalibrateCommand : public vibrig::test::VibrigCommand {
     }
 };
 
+TEST_F(CalibrateCommand, AFileWithoutItsLastEndIsTakenWithAWarning) {
+    // GIVEN readings under a header of its own case
+    write("whole.csv", readings({1, 2}, 2, 3, true));
+    std::string text = content("whole.csv");
+    text.replace(text.find("x1,x2"), 5, "X1, X2 ");
+    write("whole.csv", text);
+    ASSERT_EQ(vibrig("calibrate whole.csv --json"), 0) << error;
+    EXPECT_EQ(Json::parse(out)["warnings"], Json::array());
+    EXPECT_EQ(error, "");
+    // WHEN it is cut within its last number
+    write("cut.csv", text.substr(0, text.size() - 3));
+    static_cast<void>(vibrig("calibrate cut.csv --json"));
+    // THEN people and programs hear of it
+    EXPECT_NE(error.find("warning: cut.csv:106: found no end of line behind '"), std::string::npos)
+        << error;
+    EXPECT_NE(Json::parse(out)["warnings"].dump().find("cut.csv:106: found no end of line"),
+              std::string::npos)
+        << out;
+}
+
 TEST_F(CalibrateCommand, FillsInTheFileThatThePlanWrote) {
     // GIVEN a plan for two spheres
     ASSERT_EQ(vibrig("plan --turntable --spheres 1,2 --runs 40 --json -o turntable.csv"), 0)
@@ -182,7 +202,8 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
          {Case{"calibrate missing.csv", "missing.csv"},
           Case{"calibrate empty.csv", "empty.csv"},
           Case{"calibrate header.csv", "header.csv"},
-          Case{"calibrate none.csv", "no column x3"},
+          Case{"calibrate none.csv",
+               "no column x3, expected the columns x1, x2, x3 and y, and sigma and count if known"},
           Case{"calibrate word.csv", "word.csv:3: column y: found 'one'"},
           Case{"calibrate nan.csv", "nan.csv:2: column y: found 'nan'"},
           Case{"calibrate comma.csv", "comma.csv:3: found 5 fields, expected 4 as in the header"},

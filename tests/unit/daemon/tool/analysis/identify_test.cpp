@@ -88,6 +88,22 @@ TEST_F(Identify, FindsAllThirtyWithinFourSigma) {
                                  Not(HasSubstr("nan")), Not(HasSubstr("Not observable"))));
 }
 
+TEST_F(Identify, TellsACutRecordingAndASimulatedOne) {
+    record("--dwell 2");
+    const Outcome whole = vibrig("identify rec.csv --json");
+    EXPECT_EQ(Json::parse(whole.out)["simulated"], true);
+    EXPECT_EQ(whole.error, "");
+    // The last number before the mark is cut, the mark with it.
+    const std::string text = content_of(folder_ / "rec.csv");
+    write("rec.csv", text.substr(0, text.size() - 4));
+    EXPECT_THAT(vibrig("identify rec.csv").error,
+                HasSubstr("9 fields and no end of line, expected 10: the file was cut"));
+    write("rec.csv", text.substr(0, text.size() - 1));
+    const Outcome open = vibrig("identify rec.csv --json");
+    EXPECT_THAT(open.error, HasSubstr("warning: rec.csv:2241: found no end of line behind '1'"));
+    EXPECT_THAT(Json::parse(open.out)["warnings"].dump(), HasSubstr("no end of line"));
+}
+
 TEST_F(Identify, HoldsOutWhatIsToVerifyAtOneFrequencyToo) {
     // GIVEN a recording at one frequency whose fourth dwell is to prove the result
     record("--dwell 10");

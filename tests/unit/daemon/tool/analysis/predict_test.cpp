@@ -461,6 +461,7 @@ TEST_F(Predict, BadInputIsNamedByPlaceAndValue) {
     profile(R"({"psd": {"up": [[20, 1e308], [40, 1e308]]}})", "found more than 10000 g rms");
     profile(R"({"psd": [[20, 1e308], [40, 1e308]]})", "found more than 10000 g rms");
     profile(R"({"sines": [[20, 1e200]]})", "found more than 10000 g rms");
+    profile(R"({"sines": [[55, 3], [55, 3]]})", "sines[1]: found 55 Hz as in [0], expected one");
     profile(R"({"psd": {}})", "psd: found {}, expected an object with north, up, east");
     profile(R"({"psd": [[20, 0.1], [40, 0.1]], "cross": {}})",
             "cross: found without a psd of several axes");
@@ -556,6 +557,10 @@ TEST_F(Predict, SpectraOfARecordingWithoutTheColumn) {
     const Ended ended = run("identify plain.csv --spectra spectra.json");
     EXPECT_EQ(ended.exit_code, 2);
     EXPECT_THAT(ended.error, HasSubstr("spectra.json: [0].lines[0]: found [15,-6]"));
+    write("spectra.json", R"([{"run": 1, "position": 1, "lines": [[15, 6], [15, 1]]}])");
+    const Ended twice = run("identify plain.csv --spectra spectra.json");
+    EXPECT_EQ(twice.exit_code, 2);
+    EXPECT_THAT(twice.error, HasSubstr("spectra.json: [0].lines[1]: found 15 Hz as in [0]"));
     EXPECT_EQ(run("identify plain.csv --spectrum bent").exit_code, 2);
 }
 

@@ -73,7 +73,8 @@ class Swept : public ::testing::Test {
         std::istringstream in(content(from.c_str()));
         std::ofstream out(folder_ / to);
         for (std::string line; std::getline(in, line);) {
-            const auto last = line.rfind(',');
+            // Before the mark `simulated`.
+            const auto last = line.rfind(',', line.rfind(',') - 1);
             const std::string text = line.substr(last + 1);
             const double is = std::atof(text.c_str());
             if (is < 20) {
@@ -82,7 +83,7 @@ class Swept : public ::testing::Test {
             }
             std::array<char, 32> digits{};
             std::snprintf(digits.data(), digits.size(), "%.4f", hz(is));
-            out << line.substr(0, last + 1) << digits.data() << '\n';
+            out << line.substr(0, last + 1) << digits.data() << ",1\n";
         }
     }
     std::filesystem::path folder_;

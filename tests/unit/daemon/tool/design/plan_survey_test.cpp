@@ -49,7 +49,7 @@ TEST_F(SurveyCommand, PlansTheSurveyOf63Dwells) {
     // 2.8 h with gaps
     EXPECT_NEAR(plan["duration_s"].get<double>() / 3600, 2.1, 0.8);
     // AND vibrigd's reader takes the file
-    const auto runs = vibrig::plan::read_plan(path("plan.json"), as_the_table);
+    const auto runs = vibrig::plan::read_plan_file(path("plan.json"), as_the_table).runs;
     ASSERT_EQ(runs.size(), plan["runs"].size());
     for (std::size_t i = 0; i < runs.size(); ++i)
         EXPECT_EQ(runs[i].frequency_hz, plan["runs"][i].value("frequency_hz", 0.0)) << i;
@@ -212,7 +212,7 @@ TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
     EXPECT_TRUE(refuses(at + R"(,"role":"test"}]})", "\"identify\" or \"verify\"")) << error;
     write("plan.csv",
           "alpha_deg,beta_deg,gamma_deg,level_g,frequency_hz\n0,0,0,6,35.1\n0,0,45,0,0\n");
-    const auto runs = vibrig::plan::read_plan(path("plan.csv"), as_the_table);
+    const auto runs = vibrig::plan::read_plan_file(path("plan.csv"), as_the_table).runs;
     ASSERT_EQ(runs.size(), 2U);
     EXPECT_EQ(runs[0].frequency_hz, 35.1);
     EXPECT_EQ(runs[1].frequency_hz, 0);
@@ -221,7 +221,9 @@ TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
 TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
     const auto read = [&](const std::string& text) {
         write("plan.csv", text);
-        return vibrig::plan::read_plan(path("plan.csv"), [](auto) { return std::optional(0.5); });
+        return vibrig::plan::read_plan_file(path("plan.csv"),
+                                            [](auto) { return std::optional(0.5); })
+            .runs;
     };
     // Columns in any order, others ignored; a profile by name, with spaces about it, or by number.
     const auto runs = read(
@@ -261,8 +263,9 @@ TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
     write(
         "plan.json",
         R"({"runs":[{"position":[10,20,30],"profile":"broad","level_db":-1.5,"role":"verify"}]})");
-    const auto json =
-        vibrig::plan::read_plan(path("plan.json"), [](auto) { return std::optional(0.5); });
+    const auto json = vibrig::plan::read_plan_file(path("plan.json"), [](auto) {
+                          return std::optional(0.5);
+                      }).runs;
     EXPECT_EQ(json[0].profile, runs[1].profile);
     EXPECT_EQ(json[0].level_db, runs[1].level_db);
 }
@@ -274,7 +277,7 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     const auto refusal = [&](const std::string& row) -> std::string {
         write("plan.csv", head + row + "\n");
         try {
-            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
+            static_cast<void>(vibrig::plan::read_plan_file(path("plan.csv"), as_the_table));
         } catch (const vibrig::plan::PlanFileError& refused) {
             return std::string(refused.what()).substr(path("plan.csv").size());
         }
@@ -308,14 +311,17 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     const auto column = [&](const std::string& name) -> std::string {
         write("plan.csv", "alpha_deg,beta_deg,gamma_deg,table_g," + name + "\n0,0,0,6,2\n");
         try {
-            static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
+            static_cast<void>(vibrig::plan::read_plan_file(path("plan.csv"), as_the_table));
         } catch (const vibrig::plan::PlanFileError& refused) {
             return std::string(refused.what()).substr(path("plan.csv").size());
         }
         return "";
     };
-    EXPECT_EQ(column("counts"),
-              ":1: column counts: found an unknown key, expected a known one, perhaps count");
+    EXPECT_EQ(
+        column("counts"),
+        ":1: column counts: found an unknown key, expected a known one, perhaps count; known "
+        "are alpha_deg, beta_deg, gamma_deg, count, level_g, table_g, frequency_hz, level_db, "
+        "sweep_from_hz, sweep_to_hz, sweep_s, profile, role");
     EXPECT_EQ(
         column("dwell_s"),
         ":1: column dwell_s: found one of a run, expected none: it is campaign.dwell_s of the "
@@ -329,7 +335,8 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsReportedWithLineAndColumn) {
     EXPECT_EQ(column("frequency_hz,freq_hz"), "");
     write("plan.csv", head + "0,0,0,,,broad,0,,,,\n");
     try {
-        vibrig::plan::refuse_random(vibrig::plan::read_plan(path("plan.csv"), as_the_table));
+        vibrig::plan::refuse_random(
+            vibrig::plan::read_plan_file(path("plan.csv"), as_the_table).runs);
         ADD_FAILURE() << "taken";
     } catch (const vibrig::plan::PlanFileError& refused) {
         EXPECT_NE(std::string(refused.what()).find("plan.csv:3: column profile: found broad"),

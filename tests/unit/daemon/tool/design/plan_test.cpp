@@ -45,8 +45,9 @@ TEST_F(PlanCommand, MakesPlansWhoseFileComesBackUnchanged) {
     EXPECT_EQ(json()["runs"], plan["runs"]);
     // AND so it is for vibrigd
     const auto runs = [&](double transmission) {
-        return vibrig::plan::read_plan((folder_ / "plan.json").string(),
-                                       [=](auto) { return std::optional(transmission); });
+        return vibrig::plan::read_plan_file((folder_ / "plan.json").string(),
+                                            [=](auto) { return std::optional(transmission); })
+            .runs;
     };
     EXPECT_EQ(runs(0.6667).size(), plan["runs"].size());
     EXPECT_THROW(static_cast<void>(runs(0.9)), vibrig::plan::PlanFileError)

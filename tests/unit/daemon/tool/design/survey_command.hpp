@@ -24,7 +24,7 @@ class SurveyCommand : public test::VibrigCommand {
     bool refuses(const std::string& plan, const std::string& words) {
         write("bad.json", plan);
         try {
-            refuse_random(read_plan(path("bad.json"), as_the_table));
+            refuse_random(read_plan_file(path("bad.json"), as_the_table).runs);
         } catch (const PlanFileError& refusal) {
             error = refusal.what();
             return error.find(words) != std::string::npos;
