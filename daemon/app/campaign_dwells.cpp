@@ -227,10 +227,7 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     dwell.sigma = estimate.sigma;
     dwell.observable = estimate.observable;
     dwell.covariance = with_.book.identification().covariance();
-    const auto& rows = with_.book.identification().rows();
-    if (!summary.left_out && !rows.empty() && rows.back().run == summary.run &&
-        rows.back().position == summary.position)
-        dwell.numbers = record::numbers_of(rows.back());
+    dwell.numbers = record::numbers_after(with_.book.identification(), summary);
     with_.recorder->dwell_done(std::move(dwell));
 }
 

@@ -226,7 +226,7 @@ void refuse_rival(const Place& place, const fs::path& root, const std::string& s
     Index index(place.index, Database::Mode::write);
     for (const std::string& key : index.rivals_of(entry)) {
         if (!fs::is_directory(root / key, none)) continue;
-        throw ArchiveError(
+        throw Refused(
             source + ": found other files of a campaign that the archive has as " +
             (root / key).string() +
             ", with the same beginning and end, expected the same ones; one of them was changed or "

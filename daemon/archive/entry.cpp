@@ -102,6 +102,13 @@ void take_result(const std::string& result_json, Entry& to) {
 }
 
 Entry read_entry(const std::string& folder) {
+    Entry entry = read_recorded(folder);
+    entry.files = list_files(folder);
+    entry.hash = campaign_hash(entry.files);
+    return entry;
+}
+
+Entry read_recorded(const std::string& folder) {
     const auto parts = record::part_files(folder);
     if (parts.empty())
         throw ArchiveError(folder + ": found no campaign.h5 in it, expected a campaign's folder");
@@ -145,8 +152,6 @@ Entry read_entry(const std::string& folder) {
                                       *std::ranges::min_element(of),
                                       *std::ranges::max_element(of)});
     }
-    entry.files = list_files(folder);
-    entry.hash = campaign_hash(entry.files);
     return entry;
 }
 

@@ -17,6 +17,12 @@ class ArchiveError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// What is not archived as it is, however often it is tried.
+class Refused : public ArchiveError {
+  public:
+    using ArchiveError::ArchiveError;
+};
+
 /// One coefficient of a campaign's result; deg/h, deg/h/g, deg/h/g^2.
 struct Coefficient {
     double value = 0;
@@ -69,6 +75,8 @@ struct Entry {
 /// Reads a campaign's folder, but not its samples. Throws ArchiveError, hdf5::Error or
 /// std::runtime_error; for a campaign that is still being recorded as well.
 [[nodiscard]] Entry read_entry(const std::string& folder);
+/// The same but for its files and their hash.
+[[nodiscard]] Entry read_recorded(const std::string& folder);
 /// The result's part of it.
 void take_result(const std::string& result_json, Entry& to);
 

@@ -101,9 +101,10 @@ std::vector<Entry> Index::campaigns(const Filter& filter) {
         int simulated = 0, superseded = 0;
         where.bind(ask);
         ask.exchange(into(one.key));
-        for (auto* text : {&one.name, &one.started_by, &one.state, &one.hash, &one.rig,
-                           &one.unit_type, &one.unit_serial, &one.reason, &one.mark, &one.version,
-                           &one.configuration_hash, &one.verdict, &one.sentence})
+        for (auto* text :
+             {&one.name, &one.started_by, &one.state, &one.hash, &one.rig, &one.unit_type,
+              &one.unit_serial, &one.reason, &one.mark, &one.version, &one.compiler,
+              &one.instruction_set, &one.configuration_hash, &one.verdict, &one.sentence})
             ask.exchange(into(*text));
         for (auto* number : {&one.started_utc_ns, &one.ended_utc_ns, &one.dwells})
             ask.exchange(into(*number));
@@ -113,7 +114,8 @@ std::vector<Entry> Index::campaigns(const Filter& filter) {
         std::string text =
             "SELECT c.key, c.name, c.started_by, c.state, coalesce(r.hash, ''), coalesce(r.rig, "
             "''), coalesce(r.unit_type, ''), coalesce(r.unit_serial, ''), coalesce(r.reason, ''), "
-            "coalesce(r.mark, ''), coalesce(r.version, ''), coalesce(r.configuration_hash, ''), "
+            "coalesce(r.mark, ''), coalesce(r.version, ''), coalesce(r.compiler, ''), "
+            "coalesce(r.instruction_set, ''), coalesce(r.configuration_hash, ''), "
             "coalesce(r.verdict, ''), coalesce(r.sentence, ''), c.started_utc_ns, "
             "coalesce(r.ended_utc_ns, 0), coalesce(r.dwells, 0), coalesce(r.nis, 0), "
             "coalesce(r.simulated, 0), coalesce(r.superseded, 0) FROM campaign c LEFT JOIN result "
@@ -184,19 +186,19 @@ std::vector<Entry> Index::results(const Filter& filter, bool covariance) {
 std::optional<Entry> Index::campaign(const std::string& key) {
     return database_.guarded([&]() -> std::optional<Entry> {
         auto& sql = database_.sql();
-        std::string serial;
+        std::string serial, hash;
         std::int64_t started = 0;
         soci::indicator known = soci::i_null;
-        sql << "SELECT c.started_utc_ns, coalesce(r.unit_serial, '') FROM campaign c LEFT JOIN "
-               "result r ON r.campaign = c.key WHERE c.key = :key",
-            use(key), into(started, known), into(serial);
+        sql << "SELECT c.started_utc_ns, coalesce(r.unit_serial, ''), coalesce(r.hash, '') FROM "
+               "campaign c LEFT JOIN result r ON r.campaign = c.key WHERE c.key = :key",
+            use(key), into(started, known), into(serial), into(hash);
         if (!sql.got_data()) return {};
         Filter filter;
         filter.serial = serial;
         filter.since_utc_ns = started;
         filter.until_utc_ns = started + 1;
         filter.superseded = true;
-        for (Entry& one : serial.empty() ? campaigns(filter) : results(filter, true)) {
+        for (Entry& one : hash.empty() ? campaigns(filter) : results(filter, true)) {
             if (one.key != key) continue;
             one.files = files(key);
             Instrument instrument;

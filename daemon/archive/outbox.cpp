@@ -31,6 +31,7 @@ constexpr double kPatience_s = 600;
 constexpr double kSlowest_mb_per_s = 0.5;
 constexpr double kMega = 1e6;
 constexpr const char* kMarks = ".outbox";
+constexpr const char* kRefused = ".refused";  // below the marks, by campaign: its state, then why
 
 std::string program_beside() {
     std::error_code error;
@@ -45,6 +46,27 @@ bool is_part(const std::string& name) {
 std::string read_text(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// On the disk before anything that rests on it happens.
+void write_mark(const fs::path& path, const std::string& text) {
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    fs::path fresh = path;
+    fresh += ".new";
+    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (file < 0) return;  // delivered again, to find it there
+    const auto size = static_cast<ssize_t>(text.size());
+    const bool good = ::write(file, text.data(), text.size()) == size && ::fsync(file) == 0;
+    ::close(file);
+    if (good) fs::rename(fresh, path, error);
+}
+
+/// Why `vibrig archive add --json` refused it; empty: it did not.
+std::string refusal_in(const std::string& line) {
+    const auto root = nlohmann::json::parse(line, nullptr, false);
+    const auto found = root.is_object() ? root.find("refused") : root.end();
+    return found != root.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
 /// Its turn comes when nobody else wants processor or disk; its children inherit that.
@@ -116,9 +138,12 @@ void Outbox::show(const std::function<void(ArchiveStatus&)>& change) {
 void Outbox::show_waiting(const std::function<void(ArchiveStatus&)>& change) {
     const auto campaigns = scan();
     show([&](ArchiveStatus& s) {
-        s.waiting = s.waiting_bytes = 0;
+        s.waiting = s.waiting_bytes = s.refused = 0;
+        s.refused_note.clear();
         for (const Campaign& one : campaigns) {
-            if (one.delivered) continue;
+            if (!one.refused.empty() && s.refused++ == 0)
+                s.refused_note = one.key + ": " + one.refused;
+            if (!one.waits()) continue;
             ++s.waiting;
             s.waiting_bytes += one.bytes;
         }
@@ -159,18 +184,19 @@ void Outbox::loop() {
         int failed = 0;
         bool done = false;
         for (const Campaign& campaign : campaigns) {
-            if (campaign.delivered || stop_.load()) continue;
-            const bool good = deliver(campaign);
-            done = done || good;
+            if (!campaign.waits() || stop_.load()) continue;
+            const Outcome outcome = deliver(campaign);
+            done = done || outcome == Outcome::delivered;
             // The archive is gone, mostly: the others would fare no better now.
-            if (!good && ++failed >= kFewFailures && !done) break;
+            if (outcome == Outcome::failed && ++failed >= kFewFailures && !done) break;
         }
         if (done && !stop_.load()) ask_history();
         if (done || type_known().json.empty()) ask_type();
         campaigns = scan();
         if (failed == 0) make_room(campaigns);
-        const auto waiting = std::ranges::count(campaigns, false, &Campaign::delivered);
-        wait(failed > 0 ? retry_s : waiting > 0 ? kFirstRetry_s : kLook_s);
+        show_waiting([](ArchiveStatus&) {});  // somebody may have put right what was refused
+        const bool waiting = std::ranges::any_of(campaigns, &Campaign::waits);
+        wait(failed > 0 ? retry_s : waiting ? kFirstRetry_s : kLook_s);
         retry_s =
             failed > 0 && !done ? std::min(2 * retry_s, settings_.retry_max_s) : kFirstRetry_s;
     }
@@ -187,6 +213,7 @@ std::vector<Outbox::Campaign> Outbox::scan() const {
         one.path = entry.path().string();
         bool over = false, being_written = false;
         std::map<std::string, std::uint64_t> files;
+        std::map<std::string, fs::file_time_type::rep> changed;
         for (const auto& file : fs::directory_iterator(entry.path(), error)) {
             const std::string name = file.path().filename().string();
             const auto bytes = file.file_size(error);
@@ -197,18 +224,35 @@ std::vector<Outbox::Campaign> Outbox::scan() const {
             }
             if (!is_part(name) && !name.starts_with("raw-") && name != "dwells.csv") continue;
             files[name] = bytes;
+            changed[name] = file.last_write_time(error).time_since_epoch().count();
             one.bytes += bytes;
         }
         if (!over || being_written) continue;
-        for (const auto& [name, bytes] : files) one.print += fmt::format("{} {}\n", name, bytes);
-        one.delivered = read_text(fs::path(recordings_) / kMarks / one.key) == one.print;
+        for (const auto& [name, bytes] : files) {
+            one.print += fmt::format("{} {}\n", name, bytes);
+            one.state += fmt::format("{} {} {}\n", name, bytes, changed[name]);
+        }
+        one.state += '\n';
+        const fs::path marks = fs::path(recordings_) / kMarks;
+        one.delivered = read_text(marks / one.key) == one.print;
+        if (const std::string aside = read_text(marks / kRefused / one.key);
+            aside.starts_with(one.state))
+            one.refused = aside.substr(one.state.size());
         found.push_back(std::move(one));
     }
     std::ranges::sort(found, {}, &Campaign::key);
     return found;
 }
 
-bool Outbox::deliver(const Campaign& campaign) {
+void Outbox::put_aside(const Campaign& campaign, const std::string& why) {
+    write_mark(fs::path(recordings_) / kMarks / kRefused / campaign.key, campaign.state + why);
+    if (told_.insert(campaign.key + campaign.state + why).second)
+        event_(Severity::alarm, fmt::format("{} is refused by the archive and put aside; once that "
+                                            "is put right, vibrig archive add {}: {}",
+                                            campaign.key, campaign.path, why));
+}
+
+Outbox::Outcome Outbox::deliver(const Campaign& campaign) {
     show_waiting([&](ArchiveStatus& s) { s.delivering = campaign.key; });
     auto words = command({"archive", "add", campaign.path});
     if (!settings_.rig.empty()) {
@@ -219,9 +263,13 @@ bool Outbox::deliver(const Campaign& campaign) {
         kPatience_s + static_cast<double>(campaign.bytes) / kMega / kSlowest_mb_per_s;
     const Run run = run_child(words, limit_s, stop_);
     const bool good = run.status == 0;
-    if (stop_.load() && !good) return false;
-    if (good) {
-        mark(campaign);
+    if (stop_.load() && !good) return Outcome::failed;
+    const std::string refused = good ? "" : refusal_in(run.out);
+    if (!refused.empty()) {
+        put_aside(campaign, refused);
+        failed_.erase(campaign.key);
+    } else if (good) {
+        write_mark(fs::path(recordings_) / kMarks / campaign.key, campaign.print);
         failed_.erase(campaign.key);
         if (!std::exchange(reported_, "").empty())
             event_(Severity::info, "can be delivered to again");
@@ -237,11 +285,12 @@ bool Outbox::deliver(const Campaign& campaign) {
     }
     show_waiting([&](ArchiveStatus& s) {
         s.delivering.clear();
-        s.good = good;
-        s.note = good ? "" : run.error;
+        // Who refuses is there.
+        s.good = good || !refused.empty();
+        s.note = s.good ? "" : run.error;
         good ? ++s.delivered : ++s.failures;
     });
-    return good;
+    return good ? Outcome::delivered : refused.empty() ? Outcome::failed : Outcome::refused;
 }
 
 void Outbox::tell_moved(const std::string& line) {
@@ -291,21 +340,6 @@ void Outbox::ask_type() {
     }
 }
 
-/// The mark is on the disk before anything that rests on it happens.
-void Outbox::mark(const Campaign& campaign) const {
-    const fs::path folder = fs::path(recordings_) / kMarks;
-    std::error_code error;
-    fs::create_directories(folder, error);
-    const fs::path path = folder / campaign.key, fresh = folder / (campaign.key + ".new");
-    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (file < 0) return;  // delivered again, to find it there
-    const auto size = static_cast<ssize_t>(campaign.print.size());
-    const bool good =
-        ::write(file, campaign.print.data(), campaign.print.size()) == size && ::fsync(file) == 0;
-    ::close(file);
-    if (good) fs::rename(fresh, path, error);
-}
-
 void Outbox::make_room(const std::vector<Campaign>& campaigns) {
     if (settings_.keep_mb <= 0) return;
     double mega = 0;
@@ -320,7 +354,8 @@ void Outbox::make_room(const std::vector<Campaign>& campaigns) {
     for (const auto& [age, one] : by_age) {
         if (mega <= settings_.keep_mb || stop_.load()) return;
         // Verified anew: what the archive has lost since comes back.
-        if (!one->delivered || !deliver(*one)) continue;
+        if (!one->delivered || !one->refused.empty() || deliver(*one) != Outcome::delivered)
+            continue;
         fs::remove_all(one->path, error);
         if (error) continue;
         mega -= static_cast<double>(one->bytes) / kMega;
@@ -328,6 +363,16 @@ void Outbox::make_room(const std::vector<Campaign>& campaigns) {
         event_(Severity::info,
                one->key + ": removed here, beyond archive.keep_mb; the archive has it");
     }
+}
+
+std::string try_again(const std::string& campaign_folder) {
+    const fs::path folder = fs::weakly_canonical(campaign_folder);
+    const fs::path aside = folder.parent_path() / kMarks / kRefused / folder.filename();
+    std::error_code error;
+    fs::remove(aside, error);
+    if (!error) return {};
+    return aside.string() + ": cannot be removed: " + error.message() +
+           ": vibrigd keeps it put aside";
 }
 
 }  // namespace vibrig::archive

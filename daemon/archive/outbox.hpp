@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -19,7 +20,8 @@ namespace vibrig::archive {
 /// `vibrig archive add` as a process of its own: whatever archive, index or network do, it is that
 /// process that waits. The outbox is the folder of recordings itself, with a mark for each campaign
 /// that was delivered and verified; so nothing that is recorded can be missed, and nothing is
-/// removed before. Any thread may call.
+/// removed before. What the archive refuses is put aside with its reason, and tried again when its
+/// files have changed or a person has delivered it. Any thread may call.
 class Outbox {
   public:
     /// The unit on the rig.
@@ -53,22 +55,25 @@ class Outbox {
     /// A campaign's folder, over.
     struct Campaign {
         std::string key, path, print;
+        std::string state;  ///< the print with the times at which files were changed
         std::uint64_t bytes = 0;
         bool delivered = false;
+        std::string refused;  ///< why the archive does not take it as it is; empty: it may
+        [[nodiscard]] bool waits() const { return !delivered && refused.empty(); }
     };
+    enum class Outcome { delivered, refused, failed };
     void loop();
     [[nodiscard]] std::vector<Campaign> scan() const;
-    /// False: it failed.
-    bool deliver(const Campaign& campaign);
+    Outcome deliver(const Campaign& campaign);
+    void put_aside(const Campaign& campaign, const std::string& why);
     void tell_moved(const std::string& line);
     void ask_history();
     void ask_type();
     void make_room(const std::vector<Campaign>& campaigns);
-    void mark(const Campaign& campaign) const;
     void wait(double seconds);
     [[nodiscard]] std::vector<std::string> command(std::vector<std::string> words) const;
     void show(const std::function<void(ArchiveStatus&)>& change);
-    /// With what waits, by a look at the folders.
+    /// With what waits and what was refused, by a look at the folders.
     void show_waiting(const std::function<void(ArchiveStatus&)>& change);
 
     const configuration::ArchiveSettings settings_;
@@ -78,6 +83,7 @@ class Outbox {
     const EventSink event_;
     std::map<std::string, int> failed_;  ///< campaigns that could not be delivered, and how often
     std::string reported_;               ///< why the newest could not
+    std::set<std::string> told_;         ///< refusals, though none could be noted
     std::atomic<bool> stop_{false};
     mutable std::mutex mutex_;
     std::condition_variable changed_;
@@ -87,5 +93,9 @@ class Outbox {
     TypeKnown type_known_;
     std::thread thread_;
 };
+
+/// A person has delivered the campaign in this folder: what put it aside there is forgotten. Why it
+/// cannot be, if it cannot.
+[[nodiscard]] std::string try_again(const std::string& campaign_folder);
 
 }  // namespace vibrig::archive

@@ -1,9 +1,15 @@
 #include "daemon/archive/verify.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <set>
 
 #include "daemon/archive/manifest.hpp"
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
 
@@ -13,16 +19,113 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The files as the index has them, and as the manifest beside them has.
-void check_copy(const Entry& entry, std::vector<File> files, const fs::path& folder, bool quick,
+std::string number_text(double number) {
+    return std::isfinite(number) ? fmt::format("{:.15g}", number) : "-";
+}
+
+/// As the index keeps it: table and column, with the row where there are several, and the value.
+using Cells = std::map<std::string, std::string>;
+
+void add_coefficients(const Entry& of, Cells& to) {
+    for (std::size_t i = 0; i < of.coefficients.size(); ++i) {
+        if (!of.coefficients[i]) continue;
+        const Coefficient& c = *of.coefficients[i];
+        for (const auto& [column, value] : {std::pair{"value", c.value},
+                                            {"sigma", c.sigma},
+                                            {"u_a", c.u_a},
+                                            {"u", c.u},
+                                            {"expanded", c.expanded}})
+            to[fmt::format("coefficient.{} of {}", column, estimator::parameter_names()[i])] =
+                number_text(value);
+    }
+    // Without a coefficient the index keeps none.
+    if (to.empty()) return;
+    for (std::size_t i = 0; i < of.covariance.size(); ++i)
+        to[fmt::format("covariance.lower_triangle, number {}", i + 1)] =
+            std::isfinite(of.covariance[i]) ? fmt::format("{:.9g}", of.covariance[i]) : "-";
+}
+
+Cells cells_of(const Entry& of) {
+    Cells cells;
+    add_coefficients(of, cells);
+    for (const auto& [column, text] : {std::pair{"campaign.name", &of.name},
+                                       {"campaign.started_by", &of.started_by},
+                                       {"campaign.state", &of.state},
+                                       {"result.unit_type", &of.unit_type},
+                                       {"result.unit_serial", &of.unit_serial},
+                                       {"result.reason", &of.reason},
+                                       {"result.mark", &of.mark},
+                                       {"result.version", &of.version},
+                                       {"result.compiler", &of.compiler},
+                                       {"result.instruction_set", &of.instruction_set},
+                                       {"result.configuration_hash", &of.configuration_hash},
+                                       {"result.verdict", &of.verdict},
+                                       {"result.sentence", &of.sentence}})
+        cells[column] = *text;
+    for (const auto& [column, number] : {std::pair{"campaign.started_utc_ns", of.started_utc_ns},
+                                         {"result.ended_utc_ns", of.ended_utc_ns},
+                                         {"result.dwells", of.dwells},
+                                         {"result.simulated", of.simulated ? 1 : 0}})
+        cells[column] = std::to_string(number);
+    cells["result.nis"] = number_text(of.nis);
+    for (const auto& [name, value] : of.noise)
+        if (std::isfinite(value)) cells["noise.value of " + name] = number_text(value);
+    for (const Temperature& t : of.temperatures) {
+        cells["temperature.mean_c of " + t.sensor] = number_text(t.mean);
+        cells["temperature.low_c of " + t.sensor] = number_text(t.low);
+        cells["temperature.high_c of " + t.sensor] = number_text(t.high);
+    }
+    std::vector<std::string> instruments;
+    for (const Instrument& i : of.instruments)
+        instruments.push_back(i.name + ", " + i.serial + ", " + i.certificate + ", " + i.due);
+    std::ranges::sort(instruments);  // the index keeps no order
+    for (std::size_t i = 0; i < instruments.size(); ++i)
+        cells[fmt::format("instrument, number {}", i + 1)] = instruments[i];
+    return cells;
+}
+
+/// The index's rows against what the recording's own files say.
+void check_rows(const Entry& indexed, const fs::path& folder, const std::string& index,
+                Verified& to) {
+    const auto differs = [&](const std::string& column, const std::string& found,
+                             const std::string& expected, const fs::path& by) {
+        to.findings.push_back({"index differs", indexed.key,
+                               fmt::format("{}: {} of {}: found {}, expected {} of {}", index,
+                                           column, indexed.key, found, expected, by.string())});
+    };
+    if (const std::string hash = campaign_hash(indexed.files); indexed.hash != hash)
+        differs("result.hash", indexed.hash, hash, folder);
+    if (const std::string rig = origin_in(folder.string()).rig; !rig.empty() && rig != indexed.rig)
+        differs("result.rig", indexed.rig, rig, folder / kManifestName);
+    try {
+        const Cells is = cells_of(read_recorded(folder.string())), was = cells_of(indexed);
+        const auto text_in = [](const Cells& cells, const std::string& column) {
+            const auto found = cells.find(column);
+            return found == cells.end() ? "nothing" : '"' + record::shown(found->second) + '"';
+        };
+        std::set<std::string> columns;
+        for (const Cells* of : {&is, &was})
+            for (const auto& [column, value] : *of) columns.insert(column);
+        for (const auto& column : columns)
+            if (const auto found = text_in(was, column), expected = text_in(is, column);
+                found != expected)
+                differs(column, found, expected, folder);
+    } catch (const std::exception& error) {
+        to.findings.push_back({"damaged", indexed.key, error.what()});
+    }
+}
+
+/// The files as the index has them, and as the manifest beside them has; whether they are so.
+bool check_copy(const Entry& entry, std::vector<File> files, const fs::path& folder, bool quick,
                 Verified& to) {
     std::error_code error;
     if (!fs::exists(folder, error)) {
         to.findings.push_back(
             {"missing", entry.key,
              folder.string() + ": " + (error ? error.message() : std::string("no such folder"))});
-        return;
+        return false;
     }
+    const std::size_t before = to.findings.size();
     to.files += files.size();
     for (File& file : files) {
         to.bytes += file.bytes;
@@ -32,6 +135,7 @@ void check_copy(const Entry& entry, std::vector<File> files, const fs::path& fol
         to.findings.push_back({"damaged", entry.key, "the index has none of its files"});
     for (auto& words : differences(folder.string(), files))
         to.findings.push_back({"damaged", entry.key, std::move(words)});
+    return to.findings.size() == before;
 }
 
 /// What is named, and passed by.
@@ -95,11 +199,16 @@ Verified verify(const Place& place, const std::string& recordings, const std::st
         if (progress) progress(found.campaigns, entries.size());
         ++found.campaigns;
         keys.insert(entry.key);
-        check_copy(entry, index.files(entry.key), fs::path(place.folder) / entry.key, quick, found);
-        if (entry.hash.empty())
+        const fs::path folder = fs::path(place.folder) / entry.key;
+        const bool whole = check_copy(entry, index.files(entry.key), folder, quick, found);
+        if (entry.hash.empty()) {
             found.findings.push_back(
                 {"not in the index", entry.key,
                  "its result is not read: vibrig archive add " + place.folder + "/" + entry.key});
+        } else if (whole && !quick) {
+            if (const auto indexed = index.campaign(entry.key))
+                check_rows(*indexed, folder, index.name(), found);
+        }
     }
     for (const auto& folder : campaign_folders(place.folder, strange_in(place.folder, found))) {
         const std::string key = fs::path(folder).lexically_relative(place.folder).string();

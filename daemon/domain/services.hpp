@@ -65,6 +65,8 @@ struct ArchiveStatus {
     std::uint64_t waiting = 0, waiting_bytes = 0;  ///< over and not delivered
     std::uint64_t delivered = 0, failures = 0;     ///< attempts since the start
     std::uint64_t removed = 0;                     ///< here, delivered and beyond archive.keep_mb
+    std::uint64_t refused = 0;                     ///< by the archive: put aside, not waiting
+    std::string refused_note;                      ///< the first of them, and why
 };
 
 /// Lines of the log on their way to stderr or the file; taken = written + dropped + waiting.

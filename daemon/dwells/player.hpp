@@ -25,6 +25,8 @@ class Player {
     [[nodiscard]] DwellBook& book() noexcept { return book_; }
     [[nodiscard]] const DwellBook& book() const noexcept { return book_; }
 
+    /// The filter as displays saw it last: after a dwell as it was at its very end.
+    [[nodiscard]] estimator::Estimate shown() const { return stage_.view().estimate; }
     /// Time of the newest sample.
     [[nodiscard]] drivers::Time now() const noexcept { return now_; }
 

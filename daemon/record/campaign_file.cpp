@@ -20,6 +20,7 @@
 #include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_columns.hpp"
 #include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/digest.hpp"
 #include "daemon/record/hdf5.hpp"
 
 namespace vibrig::record {
@@ -164,6 +165,14 @@ void read_played(const File& file, Campaign& to) {
 }
 
 /// Recordings made before there were any have none.
+void read_dwell_numbers(const File& file, Campaign& to) {
+    if (!file.has("/dwells/rate")) return;
+    const auto rows = rows_of<DwellNumbers>(file, "/dwells");
+    for (std::size_t i = 0; i < std::min(rows.size(), to.dwells.size()); ++i)
+        to.dwells[i].numbers = rows[i];
+}
+
+/// Recordings made before there were any have none.
 void read_conditions(const File& file, Campaign& to) {
     if (!file.has("/conditions")) return;
     ConditionRow like;
@@ -179,6 +188,21 @@ bool says_simulated(const std::string& result) {
     const auto root = nlohmann::json::parse(result, nullptr, false);
     const auto found = root.is_object() ? root.find("simulated") : root.end();
     return found != root.end() && *found == true;
+}
+
+/// What it says of unit and instruments nothing else in the recording knows, and no number shows.
+void refuse_changed_configuration(const File& file, const std::string& configuration) {
+    std::string expected;
+    try {
+        expected = file.text("/", kConfigurationDigest);
+    } catch (const hdf5::Error&) {
+        return;  // of a daemon that wrote none
+    }
+    if (const std::string found = sha256_of_text(configuration); found != expected)
+        throw hdf5::Error(fmt::format(
+            "{}: /configuration: found SHA-256 {}, expected {} of attribute {}: it is not what was "
+            "recorded",
+            file.path(), found, shown(expected), kConfigurationDigest));
 }
 
 void read_head(const File& file, Campaign& to) {
@@ -208,6 +232,7 @@ void read_head(const File& file, Campaign& to) {
         }
     });
     head.configuration = file.read_text("/configuration");
+    refuse_changed_configuration(file, head.configuration);
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
     if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
@@ -302,6 +327,7 @@ Campaign read_part(const std::string& path) try {
     Dwell dwell;
     dwell.covariance.resize(estimator::kParameters * estimator::kParameters);
     campaign.dwells = rows_of(file, "/dwells", dwell);
+    read_dwell_numbers(file, campaign);
     // Recordings made before there were any have none.
     if (file.has("/sweeps")) campaign.swept = rows_of<SweptRow>(file, "/sweeps");
     campaign.estimates = rows_of<EstimateRow>(file, "/estimates");

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "daemon/record/campaign_columns.hpp"
+#include "daemon/record/digest.hpp"
 #include "proto/json_text.hpp"
 
 namespace vibrig::record {
@@ -108,6 +109,7 @@ void CampaignWriter::write_head(const Head& head) {
     if (!head.journal_head.empty()) file_->set("/", "journal_head", head.journal_head);
     file_->set("/", "coefficients",
                fmt::format("{}", fmt::join(estimator::parameter_names(), " ")));
+    file_->set("/", kConfigurationDigest, sha256_of_text(head.configuration));
     file_->write_text("/configuration", head.configuration, "effective configuration, TOML");
     file_->write_text("/dbc", head.dbc, "signals on the bus");
     file_->write_text("/interlocks", head.interlocks, "rows of the interlock's table, JSON");
@@ -128,7 +130,7 @@ void CampaignWriter::put(const Played& played) {
 void CampaignWriter::put(const Dwell& dwell) {
     Dwell whole = dwell;
     whole.covariance.resize(estimator::kParameters * estimator::kParameters);
-    put_row(*dwells_, whole, dwell.numbers);
+    put_row(*dwells_, whole, dwell.numbers.value_or(DwellNumbers{}));
 }
 
 void CampaignWriter::put(const ConditionRow& row) {

@@ -12,6 +12,8 @@
 namespace vibrig::record {
 
 inline constexpr std::int64_t kFormatVersion = 2;
+/// Attribute: SHA-256 of /configuration.
+inline constexpr const char* kConfigurationDigest = "configuration_sha256";
 
 /// How a campaign, or this file of it, ended; but for its result. Of a closed file.
 void write_end(hdf5::File& file, const Ended& ended);

@@ -26,4 +26,13 @@ DwellNumbers numbers_of(const estimator::DwellRow& row) {
     return numbers;
 }
 
+DwellNumbers numbers_after(const estimator::Identification& identification,
+                           const estimator::DwellSummary& summary) {
+    const auto& rows = identification.rows();
+    if (summary.left_out || rows.empty() || rows.back().run != summary.run ||
+        rows.back().position != summary.position)
+        return {};
+    return numbers_of(rows.back());
+}
+
 }  // namespace vibrig::record

@@ -98,7 +98,7 @@ constexpr std::array<double, N> not_known() {
     return values;
 }
 
-/// What a dwell says of the coefficients, all in numbers; nobody reads it back. NaN: left out.
+/// What a dwell says of the coefficients, all in numbers. NaN: left out.
 struct DwellNumbers {
     double middle_s = not_known<1>()[0];
     std::array<double, 3> rate = not_known<3>();
@@ -110,6 +110,9 @@ struct DwellNumbers {
     double sync_arcsec = not_known<1>()[0];
 };
 [[nodiscard]] DwellNumbers numbers_of(const estimator::DwellRow& row);
+/// Of the dwell that ended last.
+[[nodiscard]] DwellNumbers numbers_after(const estimator::Identification& identification,
+                                         const estimator::DwellSummary& summary);
 
 /// A dwell that is over, and what was known after it.
 struct Dwell {
@@ -118,8 +121,8 @@ struct Dwell {
     std::string reason;  ///< of the summary's flag
     std::array<double, estimator::kParameters> value{}, sigma{};
     std::array<bool, estimator::kParameters> observable{};
-    std::vector<double> covariance;  ///< 30 x 30, row-major
-    DwellNumbers numbers;
+    std::vector<double> covariance;       ///< 30 x 30, row-major
+    std::optional<DwellNumbers> numbers;  ///< nothing: an older recording has none
 };
 
 /// How a campaign ended.

@@ -3,15 +3,15 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
-#include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include "daemon/dwells/player.hpp"
+#include "daemon/record/as_recorded.hpp"
+#include "estimator/identification/dwell_row.hpp"
 
 namespace vibrig::record {
 
@@ -52,32 +52,8 @@ bool take_done(dwells::Player& player, Dwell& dwell, const Order* order) {
     dwell.summary = done.summary;
     dwell.reason = done.summary.reason;
     take_estimate(player.book().identification(), dwell);
+    dwell.numbers = numbers_after(player.book().identification(), dwell.summary);
     return true;
-}
-
-bool same(double a, double b) {
-    // To the last bit; and what is not a number is so on both sides.
-    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-
-std::string difference(const Dwell& was, const Dwell& is) {
-    const std::string where =
-        fmt::format("run {} position {}", was.summary.run, was.summary.position);
-    if (was.summary.run != is.summary.run || was.summary.position != is.summary.position)
-        return where + ": another dwell";
-    if (was.summary.samples != is.summary.samples)
-        return fmt::format("{}: {} samples, recorded {}", where, is.summary.samples,
-                           was.summary.samples);
-    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
-        if (!same(was.value[i], is.value[i]) || !same(was.sigma[i], is.sigma[i]))
-            return fmt::format("{}: {} = {:.17g} +- {:.17g}, recorded {:.17g} +- {:.17g}", where,
-                               estimator::parameter_names()[i], is.value[i], is.sigma[i],
-                               was.value[i], was.sigma[i]);
-    }
-    if (was.covariance.size() != is.covariance.size() ||
-        !std::ranges::equal(was.covariance, is.covariance, same))
-        return where + ": covariance";
-    return {};
 }
 
 }  // namespace
@@ -160,7 +136,19 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     const bool decide = !noise_known(campaign);
     using Noise = dwells::DwellBook::Noise;
     dwells::Player player(settings, decide ? Noise::decided : Noise::given);
+    const auto recorded = recorded_dwells(campaign);
+    EstimatesAgain estimates(campaign, recorded);
     std::size_t at = 0;
+    bool in_dwell = false;
+    const auto push = [&](std::span<const drivers::Sample> some) {
+        if (!in_dwell || !estimates.wanted()) return player.push(some);
+        for (const auto& sample : some) {
+            player.push({&sample, 1});
+            estimator::Estimate estimate;
+            player.book().identification().estimate(estimate);
+            estimates.see(sample.time, estimate);
+        }
+    };
     const auto play_until = [&](std::size_t end) {
         while (at < end) {
             std::size_t n = std::min(end - at, dwells::Player::kMost);
@@ -174,7 +162,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
                     begin + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                                 std::chrono::duration<double>(due)));
             }
-            player.push(std::span(samples).subspan(at, n));
+            push(std::span(samples).subspan(at, n));
             at += n;
             if (options.progress) options.progress(at, samples.size());
         }
@@ -189,7 +177,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
                     dwell.summary.flagged = was.summary.flagged;
                     dwell.reason = was.reason;
                 }
-                const std::string what = difference(was, dwell);
+                const std::string what = dwell_difference(out.dwells.size(), was, dwell);
                 if (!what.empty()) ++out.different;
                 if (out.first_difference.empty()) out.first_difference = what;
             }
@@ -197,7 +185,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
             out.dwells.push_back(std::move(dwell));
         }
     };
-    for (const RecordedDwell& dwell : recorded_dwells(campaign)) {
+    for (const RecordedDwell& dwell : recorded) {
         play_until(std::max(at, dwell.first));
         newest = dwell.order;
         player.book().use_noise(dwell.order->noise);
@@ -208,7 +196,9 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
         order.dwell = dwell.order->dwell();
         player.order(order);
         const std::size_t end = dwell.first + dwell.count;
+        in_dwell = true;
         play_until(end);
+        in_dwell = false;
         if (!dwell.cut_short && end < samples.size() && dwell.count > 0) {
             play_until(end + 1);  // the first sample behind it ends the dwell
         } else {
@@ -216,10 +206,15 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
             cancel.cancel = true;
             player.order(cancel);
         }
+        if (dwell.count > 0) estimates.see(player.now(), player.shown());
         take();
     }
     play_until(samples.size());
     take();
+    estimates.end();
+    out.estimates = estimates.compared();
+    out.estimates_different = estimates.different();
+    if (out.first_difference.empty()) out.first_difference = estimates.first_difference();
     out.result = player.book().identification().result();
     out.rows = player.book().identification().rows();
     out.means = player.book().identification().means();

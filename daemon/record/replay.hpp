@@ -30,9 +30,11 @@ struct ReplayResult {
     std::optional<Dwell> anew;
     std::size_t samples = 0;
     double recorded_s = 0, took_s = 0;
-    /// Estimates after each dwell that are not those of the recording to the last bit.
+    /// Dwells, and rows of /estimates, that are not those of the recording to the last bit.
     std::size_t compared = 0, different = 0;
+    std::size_t estimates = 0, estimates_different = 0;
     std::string first_difference;  ///< empty: none
+    [[nodiscard]] bool as_recorded() const { return different == 0 && estimates_different == 0; }
 };
 
 /// Whether every dwell says which noise levels the filter took; they are then taken again, else

@@ -81,7 +81,7 @@ std::string word_of(const Campaign& campaign, const Json& result,
         throw Refused(campaign.path + ": found a result that is " +
                       (word.empty() ? "not judged" : word) + why + ", expected a valid one");
     }
-    if (replayed.compared == 0 || replayed.different != 0)
+    if (replayed.compared == 0 || !replayed.as_recorded())
         throw Refused(campaign.path +
                       ": found estimates that do not come out of the recording again, expected "
                       "every bit: " +

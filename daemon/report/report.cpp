@@ -78,7 +78,7 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
                                 std::string(estimator::instruction_set())},
               {"Replay",
                a.replayed.compared == 0 ? "no dwell to compare"
-               : a.replayed.different == 0
+               : a.replayed.as_recorded()
                    ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
                                  a.replayed.compared)
                    : "!differs from the recording: " + a.replayed.first_difference},

@@ -21,11 +21,26 @@ namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 15> kReadable{
-    "/api/v1/status",   "/api/v1/parameters", "/api/v1/campaign", "/api/v1/events",
-    "/api/v1/history",  "/api/v1/config",     "/api/v1/plan",     "/api/v1/openapi.json",
-    "/api/v1/selftest", "/api/v1/surface",    "/api/v1/unit",     "/api/v1/stream",
-    "/metrics",         "/healthz",           "/readyz"};
+/// What is read here, each with the keys that a query may have.
+struct Readable {
+    std::string_view path;
+    std::array<std::string_view, 3> keys{};
+};
+constexpr std::array<Readable, 15> kReadable{{{"/api/v1/status"},
+                                              {"/api/v1/parameters"},
+                                              {"/api/v1/campaign"},
+                                              {"/api/v1/events", {"after", "limit"}},
+                                              {"/api/v1/history", {"channel", "from"}},
+                                              {"/api/v1/config"},
+                                              {"/api/v1/plan"},
+                                              {"/api/v1/openapi.json"},
+                                              {"/api/v1/selftest"},
+                                              {"/api/v1/surface"},
+                                              {"/api/v1/unit"},
+                                              {"/api/v1/stream", {"rate_hz", "status", "after"}},
+                                              {"/metrics"},
+                                              {"/healthz"},
+                                              {"/readyz"}}};
 constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
@@ -53,24 +68,26 @@ struct EventQuery {
     std::uint64_t limit = kDefaultEvents;
 };
 
+/// Name and value of each pair in "a=1&b=2".
+void each_pair(std::string_view query, const auto& take) {
+    while (!query.empty()) {
+        const std::string_view pair = query.substr(0, query.find('&'));
+        query.remove_prefix(std::min(pair.size() + 1, query.size()));
+        const std::size_t equals = std::min(pair.find('='), pair.size());
+        take(pair.substr(0, equals), pair.substr(std::min(equals + 1, pair.size())));
+    }
+}
+
 EventQuery event_query(std::string_view query) {
     EventQuery result;
-    while (!query.empty()) {
-        const std::size_t end = std::min(query.find('&'), query.size());
-        const std::string_view pair = query.substr(0, end);
-        query.remove_prefix(std::min(end + 1, query.size()));
-        const std::size_t equals = std::min(pair.find('='), pair.size());
-        const std::string_view name = pair.substr(0, equals);
-        const std::string_view value = pair.substr(std::min(equals + 1, pair.size()));
+    each_pair(query, [&result](std::string_view name, std::string_view value) {
+        const std::uint64_t number = parse_count(name, value);
         if (name == "after") {
-            result.after = parse_count(name, value);
-        } else if (name == "limit") {
-            result.limit = std::clamp<std::uint64_t>(parse_count(name, value), 1, kMostEvents);
+            result.after = number;
         } else {
-            throw std::invalid_argument("query: found " + in_quotes(name) +
-                                        ", expected after or limit");
+            result.limit = std::clamp<std::uint64_t>(number, 1, kMostEvents);
         }
-    }
+    });
     return result;
 }
 
@@ -133,14 +150,27 @@ std::uint64_t parse_count(std::string_view name, std::string_view text) {
     return value;
 }
 
+void check_query(std::string_view path, std::string_view query) {
+    const auto* const of = std::find_if(kReadable.begin(), kReadable.end(),
+                                        [&](const Readable& one) { return one.path == path; });
+    std::string known;
+    for (const std::string_view key : of == kReadable.end() ? Readable{}.keys : of->keys)
+        if (!key.empty()) known += (known.empty() ? "" : " or ") + std::string(key);
+    each_pair(query, [&](std::string_view name, std::string_view) {
+        if (!name.empty() && of != kReadable.end() &&
+            std::find(of->keys.begin(), of->keys.end(), name) != of->keys.end())
+            return;
+        throw std::invalid_argument("query: found " + in_quotes(name) + ", expected " +
+                                    (known.empty() ? "none" : known));
+    });
+}
+
 std::string_view query_value(std::string_view query, std::string_view name) {
-    while (!query.empty()) {
-        const std::string_view pair = query.substr(0, query.find('&'));
-        query.remove_prefix(std::min(pair.size() + 1, query.size()));
-        if (pair.substr(0, pair.find('=')) == name && pair.size() > name.size())
-            return pair.substr(name.size() + 1);
-    }
-    return {};
+    std::string_view found;
+    each_pair(query, [&](std::string_view key, std::string_view value) {
+        if (key == name && found.empty()) found = value;
+    });
+    return found;
 }
 
 Api::Api(StatusSource& source, std::string instance, CarryOut carry_out)
@@ -267,7 +297,8 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
             }
         }
         if (!takes_commands &&
-            std::find(kReadable.begin(), kReadable.end(), path) == kReadable.end()) {
+            std::none_of(kReadable.begin(), kReadable.end(),
+                         [&](const Readable& one) { return one.path == path; })) {
             return problem(404, "no such path: " + in_quotes(path));
         }
         const char* const method = takes_commands ? "POST" : "GET";
@@ -277,6 +308,7 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
             refusal.allow = method;
             return refusal;
         }
+        check_query(path, query);
         return get(path, query);
     } catch (const std::invalid_argument& error) {
         return problem(400, error.what());
@@ -377,6 +409,9 @@ std::variant<ApiAnswer, CommandRequest> Api::command_of(const ApiRequest& reques
     CommandRequest parsed;
     try {
         parsed = parse_command(request.body);
+        // What is beside a stop does not keep it from being one.
+        if (parsed.kind != CommandRequest::Kind::abort && request.target != kCommands)
+            check_query(kCommands, request.target.substr(kCommands.size() + 1));
     } catch (const std::invalid_argument& error) {
         return refuse(400, caller, "a command", error.what());
     }

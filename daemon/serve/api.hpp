@@ -91,6 +91,10 @@ class Api {
     TokenBuckets logged_{0.1, 20};  ///< refusals that are logged
 };
 
+/// Throws std::invalid_argument that names what `path` does not know in its query, and what it
+/// does.
+void check_query(std::string_view path, std::string_view query);
+
 /// The value of `name` in "a=1&b=2"; empty: it is not there.
 [[nodiscard]] std::string_view query_value(std::string_view query, std::string_view name);
 

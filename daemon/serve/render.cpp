@@ -179,6 +179,8 @@ std::string broker_line(const v1::Mqtt& mqtt) {
 /// Empty: all is well, or nothing is archived.
 std::string archive_head(const v1::Archive& archive) {
     if (!archive.good() && !archive.note().empty()) return "DOWN: " + archive.note();
+    if (archive.refused() > 0)
+        return fmt::format("{} REFUSED: {}", archive.refused(), archive.refused_note());
     return archive.delivering().empty() ? "" : "on its way: " + archive.delivering();
 }
 

@@ -388,6 +388,7 @@ class Session : public std::enable_shared_from_this<Session> {
         std::uint64_t after = 0;
         bool with_status = true;
         try {
+            check_query("/api/v1/stream", query);
             rate = parse_rate(query_value(query, "rate_hz"));
             if (const auto id = query_value(query, "after"); !id.empty())
                 after = parse_count("after", id);

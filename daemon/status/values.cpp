@@ -442,6 +442,10 @@ const auto kValues = std::to_array<StatusValue>({
         .shown("archive", "{} delivered", "").off_page(),
     row("archive.failures", "", [](auto& s) { return s.archive.failures; }),
     row("archive.removed", "", [](auto& s) { return s.archive.removed; }),
+    row("archive.refused", "",
+        [](auto& s) { return only(!s.archive.folder.empty(), s.archive.refused); })
+        .gauge("vibrig_archive_refused", "Campaigns that the archive refused: put aside."),
+    row("archive.refused_note", "", [](auto& s) { return s.archive.refused_note; }),
     row("mqtt.broker", "", [](auto& s) { return s.mqtt.broker; }),
     row("mqtt.connected", "", [](auto& s) { return s.mqtt.connected; }),
     row("", "", [](auto& s) { return only(!s.mqtt.broker.empty(), s.mqtt.connected); })

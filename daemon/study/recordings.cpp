@@ -180,6 +180,7 @@ IdentifiedRecording identify_recording(const Recording& recording,
     const std::string text = settings_of_recording(campaign.head.configuration, settings);
     const auto loaded = configuration::parse(text, recording.folder, false).configuration;
     if (!settings.empty()) record::forget_noise(campaign);
+    campaign.estimates.clear();  // nobody asks whether it is as recorded
     IdentifiedRecording out{campaign.head.campaign,
                             loaded.paperwork.unit_serial,
                             campaign.state,

@@ -104,7 +104,7 @@ def clone(campaign, to, days, serial=None, shift=None, scatter=None):
             file.attrs[name] += days * DAY_NS
         file.attrs["campaign"] = numpy.bytes_(os.path.basename(to))
         if serial:
-            replace(file, "configuration", file["configuration"][()].decode().replace('"0017"', f'"{serial}"'))
+            r.reconfigure(file, '"0017"', f'"{serial}"')
         if shift is not None:
             result = json.loads(file["result"][()])
             result["parameters"][0]["value"] += shift

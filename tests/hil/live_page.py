@@ -150,7 +150,8 @@ def check_description(checks, rig, address):
     problem = api["components"]["schemas"]["Problem"]
     for path, method, headers, body, expected in [
             ("/nothing", "GET", {}, None, 404), ("/api/v1/status", "DELETE", {}, None, 405),
-            ("/api/v1/events?after=x", "GET", {}, None, 400), ("/api/v1/stream", "GET", {}, None, 426),
+            ("/api/v1/events?after=x", "GET", {}, None, 400), ("/api/v1/history?chanel=measured_g", "GET", {}, None, 400),
+            ("/api/v1/stream", "GET", {}, None, 426),
             ("/api/v1/status", "GET", {"Host": "evil.example:80"}, None, 421),
             ("/api/v1/status", "GET", {"Origin": "http://evil.example"}, None, 403),
             ("/api/v1/commands", "POST", {"Content-Type": "text/plain"}, "{}", 415),

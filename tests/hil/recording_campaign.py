@@ -299,6 +299,7 @@ def complete(checks, rig):
     checks.check(json.loads(anew.stdout)["nis"] < json.loads(result)["nis"], "other settings give another result")
     studied(checks, rig, folder, json.loads(anew.stdout))
     changed(checks, rig, path)
+    changed_numbers(checks, rig, path)
     exports(checks, rig, folder, path)
     marked(checks, rig, folder, path, result)
     wrong_input(checks, rig, path)
@@ -317,6 +318,7 @@ def studied(checks, rig, folder, anew):
                       "--plot", name + "-charts")
         charts = [open(chart, encoding="utf-8").read() for chart in glob.glob(os.path.join(rig.folder, name + "-charts", "*.svg"))]
         checks.check(len(charts) >= 2 and all("<svg" in chart and not re.search(r"\bnan\b", chart) for chart in charts), f"and drawn: {len(charts)} charts")
+        checks.check(all("SIMULATED: " in chart for chart in charts), "each of which says that the rig was simulated", name)
         checks.equal((run.returncode, run.stderr), (0, ""), f"a study of kind {name} is merged")
         with open(os.path.join(rig.folder, name + ".json"), encoding="utf-8") as file:
             return json.load(file), run.stdout
@@ -351,6 +353,26 @@ def changed(checks, rig, path):
     run = offline(rig, "replay", other, "--json")
     checks.check(json.loads(run.stdout).get("replay", {}).get("same_build") is False and "expected the same" not in run.stderr and
                  "recorded by" in run.stderr, "of another build it is said so", run.stderr)
+
+
+def changed_numbers(checks, rig, path):
+    """One number of what the filter said live is another, or whose recording it is."""
+    other = os.path.join(rig.folder, "changed.h5")
+    for column, row, factor in (("dwells/rate", 1, 1.01), ("dwells/nis_per_dof", 0, 1 + 1e-12), ("dwells/rate_regressors", 1, 2),
+                                ("estimates/value", 20, 1 + 1e-9), ("estimates/kappa", 20, 1 + 1e-9)):
+        shutil.copy(path, other)
+        with h5py().File(other, "r+") as file:
+            file[column][row] = file[column][row] * factor
+        run = offline(rig, "replay", other)
+        checks.check(run.returncode == 1 and re.search(rf"/{column}: row {row + 1}\b.*: found \S+, the replay gives \S", run.stderr),
+                     f"a changed number of /{column} is named", run.stderr)
+    shutil.copy(path, other)
+    with h5py().File(other, "r+") as file:
+        file["configuration"][()] = file["configuration"][()].replace(b'"0017"', b'"0018"')
+    for command in (("replay",), ("identify",), ("report", "-o", "never.html")):
+        run = offline(rig, command[0], other, *command[1:])
+        checks.check(run.returncode == 2 and other + ": /configuration: found SHA-256 " in run.stderr, f"{command[0]} refuses a changed serial number",
+                     run.stderr)
 
 
 def exports(checks, rig, folder, path):
@@ -532,7 +554,7 @@ def report(checks, rig, folder):
     checks.check(itself.returncode == 2 and "found the campaign itself" in itself.stderr, "not compared with itself", itself.stderr)
     with h5py().File(shutil.copy(os.path.join(folder, "campaign.h5"), os.path.join(rig.folder, "earlier.h5")), "r+") as file:
         file.attrs.modify("started_utc_ns", file.attrs["started_utc_ns"] - 86400 * 10**9)
-        file["configuration"][()] = file["configuration"][()].replace(b'"0017"', b'"0018"')
+        r.reconfigure(file, '"0017"', '"0018"')
     made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5", "--pdf", "x.pdf")
     # These positions do not determine all coefficients: the result is not valid, and the report says so.
     checks.check(made.returncode == 1 and "not valid" in made.stderr + made.stdout, "a report is written, and its verdict is a no", made.stderr)
@@ -555,7 +577,7 @@ def report(checks, rig, folder):
     axes = re.findall(r">(D_[A-Za-z]+)</text>", axes[:axes.index("</svg>")])
     checks.check({"D_Fx", "D_ISz", "D_OOy"} <= set(axes), "its correlations are of coefficients that have names", str(axes))
     with h5py().File(os.path.join(rig.folder, "earlier.h5"), "r+") as file:
-        file["configuration"][()] = file["configuration"][()].replace(b'"0018"', b'""')
+        r.reconfigure(file, '"0018"', '""')
     unknown = offline(rig, "report", folder, "-o", "unknown.html", "--compare", "earlier.h5")
     checks.check(unknown.returncode == 2 and "found no serial number" in unknown.stderr,
                  "a unit without a serial number is not compared", unknown.stderr)

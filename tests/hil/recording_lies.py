@@ -1,5 +1,6 @@
 """Lies about a recorded campaign: what can be changed in its HDF5 file, its raw logs and its dwells.csv. Each takes an
 open file and a source of chance, and says what it did; nothing: there is nothing of that kind to change."""
+import hashlib
 import os
 import re
 import subprocess
@@ -179,6 +180,8 @@ def value(file, c):
         said = f"{text[max(0, place.start() - 40):place.end()]!r} is {to}"
         text = text[:place.start()] + to + text[place.end():]
     replaced(file, name, np.bytes_(text))
+    if name == "configuration" and c.random() < 0.8:   # else it is refused unread
+        file.attrs.create("configuration_sha256", hashlib.sha256(text.encode()).hexdigest().encode(), dtype="S64")
     return f"{name}: {said}"
 
 

@@ -2,6 +2,7 @@
 import contextlib
 import ctypes
 import glob
+import hashlib
 import json
 import os
 import re
@@ -328,6 +329,14 @@ def raw_logs(folder):
     plain = set(glob.glob(os.path.join(folder, "raw-*.log")))
     packed = {path for path in glob.glob(os.path.join(folder, "raw-*.log.zst")) if path.removesuffix(".zst") not in plain}
     return sorted(plain | packed)
+
+
+def reconfigure(file, old, new):
+    """Of an open recording: its configuration is another, and was so when it was recorded."""
+    text = file["configuration"][()].replace(old.encode(), new.encode())
+    del file["configuration"]
+    file.create_dataset("configuration", data=text, dtype=f"S{len(text)}")   # of fixed length, as vibrigd writes it
+    file.attrs.create("configuration_sha256", hashlib.sha256(text).hexdigest().encode(), dtype="S64")
 
 
 def state_of(status):

@@ -136,7 +136,8 @@ def charts(b):
     for kind, words in (("rms-z", "bars: 95 %"), ("coverage", "bars: 95 %"), ("nees", "expected (95 %)")):
         paths = glob.glob(os.path.join(drawn, kind + "-[0-9]*.svg"))
         texts = [open(path, encoding="utf-8").read() for path in paths]
-        b.checks.check(len(texts) == 100 and all(words in text for text in texts), f"{len(texts)} charts: {kind}, with intervals")
+        b.checks.check(len(texts) == 100 and all(words in text and "SIMULATED: " in text for text in texts),
+                       f"{len(texts)} charts: {kind}, with intervals, of simulated campaigns")
 
 
 def twice_at_once(b):

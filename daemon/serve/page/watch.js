@@ -50,7 +50,7 @@ const Watch = (() => {
       [s.can.link === 'running' ? '' : 'bad', `CAN ${s.can.link}`], [s.shaker.link === 'running' ? '' : 'bad', `shaker ${s.shaker.link}`],
       [r.folder ? (r.good ? '' : 'warn') : 'off', r.folder ? (r.good ? (r.recording ? 'recorder records' : 'recorder ok') : 'recorder: ' + (r.note || 'degraded')) : 'no recorder'],
       [j.path ? (j.running ? '' : 'bad') : 'off', j.path ? (j.running ? 'journal ok' : 'journal waits') : 'no journal'],
-      ...(s.archive ? [[s.archive.good ? '' : 'warn', (s.archive.good ? 'archive ok' : 'archive: ' + s.archive.note) + (Number(s.archive.waiting) ? `, ${s.archive.waiting} waiting` : '')]] : []),
+      ...(s.archive ? [[s.archive.good && !Number(s.archive.refused) ? '' : 'warn', (s.archive.good ? 'archive ok' : 'archive: ' + s.archive.note) + (Number(s.archive.waiting) ? `, ${s.archive.waiting} waiting` : '') + (Number(s.archive.refused) ? `, ${s.archive.refused} refused` : '')]] : []),
       ...(s.guard ? [guard(s.guard)] : []), ...(s.annunciator ? horn(s.annunciator) : []),
       ...(s.log.blocked ? [['warn', 'log: nobody reads it']] : []),
       ...doors.map(d => ['bad', `${d.name} door shut`]),

@@ -162,6 +162,24 @@ plot::Chart error_chart(const Json& result, const std::string& unit) {
     return chart;
 }
 
+/// Before each title: a study's own campaigns are on no rig at all, recordings may be.
+std::string title_mark(const Json& result) {
+    const bool drawn = result.at("kind") == "uncertainty";
+    if (!result.contains("recordings"))
+        return !drawn || result.value("simulated", false) ? "SIMULATED: " : "";
+    const Json& all = result.at("recordings");
+    const auto simulated =
+        std::ranges::count_if(all, [](const Json& one) { return one.value("simulated", false); });
+    if (simulated == 0) return "";
+    if (static_cast<std::size_t>(simulated) == all.size()) return "SIMULATED: ";
+    return printed("SIMULATED, %ld of %zu recordings: ", static_cast<long>(simulated), all.size());
+}
+
+void write_chart(const Json& result, const std::string& path, plot::Chart chart) {
+    chart.title = title_mark(result) + chart.title;
+    proto::write_output(path, chart.svg());
+}
+
 bool determined(const Json& point) {
     const Json& coefficients = point.at("coefficients");
     return std::ranges::any_of(coefficients, [](const Json& c) { return c.contains("all"); });
@@ -171,10 +189,9 @@ std::string write_campaign_charts(const Json& result, const std::string& folder)
     const Json& points = result.at("points");
     if (std::ranges::none_of(points, determined)) return kNothing;
     plot::make_folder(folder);
-    proto::write_output(folder + "/rms-z-grid.svg", grid_chart(result).svg());
+    write_chart(result, folder + "/rms-z-grid.svg", grid_chart(result));
     for (const auto& [name, unit] : kUnits)
-        proto::write_output(folder + "/rms-error-grid-" + name + ".svg",
-                            error_chart(result, unit).svg());
+        write_chart(result, folder + "/rms-error-grid-" + name + ".svg", error_chart(result, unit));
     for (std::size_t i = 0; i < std::min(points.size(), kMostCharts); ++i) {
         const Json& point = points[i];
         const std::string name =
@@ -183,13 +200,13 @@ std::string write_campaign_charts(const Json& result, const std::string& folder)
             coefficient_chart(point, "rms of error over claimed u", "rms z",
                               {{"all inputs", "/all/rms_z"}, {"noise alone", "/noise/rms_z"}});
         z.curves.push_back(plot::level_line("theory", 1, 30, 1));
-        proto::write_output(folder + "/rms-z" + name + ".svg", z.svg());
+        write_chart(result, folder + "/rms-z" + name + ".svg", std::move(z));
         plot::Chart within = coefficient_chart(
             point, "share of errors within 1.96 u", "coverage",
             {{"all inputs", "/all/coverage/95"}, {"noise alone", "/noise/coverage/95"}});
         within.curves.push_back(plot::level_line("theory", 1, 30, 0.95));
-        proto::write_output(folder + "/coverage" + name + ".svg", within.svg());
-        proto::write_output(folder + "/nees" + name + ".svg", nees_chart(point).svg());
+        write_chart(result, folder + "/coverage" + name + ".svg", std::move(within));
+        write_chart(result, folder + "/nees" + name + ".svg", nees_chart(point));
     }
     return points.size() > kMostCharts
                ? first_of(kMostCharts, points.size(), "points") +
@@ -240,8 +257,8 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
     coverage.y = plot::Axis("share");
     coverage.curves = {std::move(within)};
     coverage.notes = {note};
-    proto::write_output(folder + "/rms-z.svg", z.svg());
-    proto::write_output(folder + "/coverage.svg", coverage.svg());
+    write_chart(result, folder + "/rms-z.svg", std::move(z));
+    write_chart(result, folder + "/coverage.svg", std::move(coverage));
 
     plot::Curve largest{.name = "largest of 30", .look = plot::Look::dots};
     for (std::size_t k = 0; k < std::min(compared.size(), kMostCompared); ++k) {
@@ -258,7 +275,7 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
                  " are in the chart of E_n";
         each.notes = {remark};
     }
-    proto::write_output(folder + "/e-n.svg", each.svg());
+    write_chart(result, folder + "/e-n.svg", std::move(each));
     return remark;
 }
 
@@ -298,8 +315,8 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
     ends.curves = {std::move(off[0]), std::move(off[1]), plot::level_line("tolerance", 1, 30, 1),
                    plot::level_line("", 1, 30, -1)};
     u.notes = ends.notes = {note};
-    proto::write_output(folder + "/rms-z.svg", u.svg());
-    proto::write_output(folder + "/interval-ends.svg", ends.svg());
+    write_chart(result, folder + "/rms-z.svg", std::move(u));
+    write_chart(result, folder + "/interval-ends.svg", std::move(ends));
     return "";
 }
 

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "daemon/archive/outbox.hpp"
 #include "daemon/archive/trend.hpp"
 #include "daemon/archive/verify.hpp"
 #include "daemon/results/json_values.hpp"
@@ -111,7 +112,14 @@ int add(const AddOptions& o) {
                 static_cast<void>(tell_missing_raw(folder));
                 tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
                               history.size(), o.json);
+                if (const auto why = archive::try_again(folder); !why.empty())
+                    std::cerr << why << '\n';
             } catch (const std::exception& error) {
+                // vibrigd tells it from a failure by this line.
+                if (dynamic_cast<const archive::Refused*>(&error) != nullptr && o.json)
+                    std::cout << proto::json_text(
+                                     Json{{"folder", folder}, {"refused", error.what()}})
+                              << std::endl;
                 if (found.size() == 1) throw;
                 std::cerr << error.what() << '\n';
                 code = kNo;
@@ -180,6 +188,8 @@ void add_archive(CLI::App& app, int& exit_code) {
         "in\n"
         "the archive is registered where it is; the archive is the current folder if none is "
         "named.\n"
+        "What vibrigd had put aside, since the archive refused it, it delivers again from then "
+        "on.\n"
         "Exit codes: 0, 1 one of several could not be added, 2 bad usage or input.");
 
     add_archive_serve(*group, exit_code);
@@ -198,7 +208,9 @@ void add_archive(CLI::App& app, int& exit_code) {
     add_archive_options(verifying, to_verify.where);
     verifying.footer(
         "Example: vibrig archive verify --config /etc/vibrig/vibrigd.toml\n"
-        "Exit codes: 0, 1 something is missing, short, different or not in the index, 2 bad usage "
+        "Exit codes: 0, 1 something is missing, short, different or not in the index, or the index "
+        "says something else "
+        "than the recordings, 2 bad usage "
         "or input.");
 }
 

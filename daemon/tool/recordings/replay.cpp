@@ -115,9 +115,11 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
 /// The result; where it is not the recording's, with a word about that.
 std::string printed_json(const record::ReplayResult& replayed, std::string text,
                          const std::string& difference, bool same_build) {
-    if (replayed.different == 0 && difference.empty()) return text;
+    if (replayed.as_recorded() && difference.empty()) return text;
     nlohmann::ordered_json replay{{"dwells", replayed.compared},
                                   {"not_as_recorded", replayed.different},
+                                  {"estimates", replayed.estimates},
+                                  {"estimates_not_as_recorded", replayed.estimates_different},
                                   {"first", replayed.first_difference},
                                   {"result", text_or_null(difference)},
                                   {"same_build", same_build}};
@@ -140,10 +142,11 @@ void say_how_it_went(const record::ReplayResult& replayed, const record::Head& r
                       replayed.took_s,
                       replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
     if (replayed.compared == 0) return;
-    if (replayed.different != 0) {
-        std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
-                  << " dwells are not as recorded (" << replayed.first_difference << "); "
-                  << builds(recorded, same_build);
+    if (!replayed.as_recorded()) {
+        std::cerr << replayed.different << " of " << replayed.compared << " dwells and "
+                  << replayed.estimates_different << " of " << replayed.estimates
+                  << " rows of /estimates are not as recorded (" << replayed.first_difference
+                  << "); " << builds(recorded, same_build);
     } else if (!difference.empty()) {
         std::cerr << "the recording's result is not that of its dwells (" << difference << "); "
                   << builds(recorded, same_build);
@@ -180,7 +183,10 @@ int replay(const ReplayArguments& arguments) {
         Progress reading("reading " + arguments.files.front());
         reading.show(0, 1);
         campaign = replayed_campaign(arguments);
-        if (!arguments.config.empty()) record::forget_noise(campaign);
+        if (!arguments.config.empty()) {
+            record::forget_noise(campaign);
+            campaign.estimates.clear();
+        }
     }
     const configuration::Configuration rig = replayed_rig(arguments, campaign);
     const estimator::Settings& settings = rig.estimator;
@@ -199,7 +205,7 @@ int replay(const ReplayArguments& arguments) {
                         record::shaken_of(campaign, rig));
     doubt_replayed(settings, replayed, found.assessed.verdict);
     // Of other settings, and where the dwells differ, it is another anyway.
-    const std::string difference = arguments.config.empty() && replayed.different == 0
+    const std::string difference = arguments.config.empty() && replayed.as_recorded()
                                        ? not_as_recorded(campaign, replayed, found, settings)
                                        : "";
     const auto& assessed = found.assessed;
@@ -215,7 +221,7 @@ int replay(const ReplayArguments& arguments) {
               << std::flush;
     say_how_it_went(replayed, campaign.head, difference, same_build);
     if (!std::cout) throw std::runtime_error("standard output: cannot be written");
-    const bool as_recorded = (replayed.different == 0 && difference.empty()) || !same_build;
+    const bool as_recorded = (replayed.as_recorded() && difference.empty()) || !same_build;
     return whole && as_recorded ? exit_status(assessed.verdict.level, arguments.strict) : kNo;
 }
 

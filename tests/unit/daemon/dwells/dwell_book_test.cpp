@@ -391,6 +391,7 @@ class Live {
         done.sigma = estimate.sigma;
         done.observable = estimate.observable;
         done.covariance = book_.identification().covariance();
+        done.numbers = record::numbers_after(book_.identification(), summary);
         recording_->put(done);
     }
 

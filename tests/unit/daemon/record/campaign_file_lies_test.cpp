@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/record/campaign_file.hpp"
+#include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "drivers/sample/sample.hpp"
 #include "parts.hpp"
@@ -63,6 +64,20 @@ TEST_F(Lies, OfALinkAreRefusedWhereverItLeads) {
     refused("/samples", "found a link, expected what it leads to");
     instead("/samples", [](hid_t) { return 0; });
     refused("/samples/time_ns", "found nothing, expected a dataset");
+}
+
+TEST_F(Lies, OfAConfigurationAreRefused) {
+    ASSERT_EQ(refusal(), "");
+    instead("/configuration", [](hid_t) { return 0; });
+    auto file = hdf5::File::open(path(), hdf5::File::Mode::write);
+    file.write_text("/configuration", "unit.serial = \"0018\"\n", "");
+    file.close();
+    refused("/configuration", "found SHA-256 ");
+    // Of an older vibrigd nothing is known.
+    const hid_t older = H5Fopen(path().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    H5Adelete(older, kConfigurationDigest);
+    H5Fclose(older);
+    EXPECT_EQ(refusal(), "");
 }
 
 TEST_F(Lies, OfValuesInAnotherFileAreRefused) {

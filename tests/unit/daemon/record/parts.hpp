@@ -97,7 +97,7 @@ class Parts : public ::testing::Test {
             if (i > 0) dwell.numbers = numbers_of(row_of(orders[i]));
             writer.put(dwell);
         }
-        writer.end({state, "", "", "{}", head.utc_ns + kSecond});
+        writer.end({state, "", "", result_, head.utc_ns + kSecond});
     }
     std::string refusal() const {
         try {
@@ -109,6 +109,7 @@ class Parts : public ::testing::Test {
     }
 
     fs::path recordings_, folder_;
+    std::string result_ = "{}";
 };
 
 }  // namespace vibrig::record

@@ -1,24 +1,37 @@
 #include "daemon/record/replay.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "daemon/dwells/player.hpp"
 #include "tests/unit/daemon/record/recording.hpp"
 
 namespace vibrig::record {
 namespace {
 
-TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
-    // GIVEN a campaign of two dwells, as it was the first time
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+Campaign two_dwells(std::vector<drivers::Sample> samples) {
     Campaign campaign;
-    campaign.samples = samples(4000, drivers::kSecond);
+    campaign.samples = std::move(samples);
     for (const int position : {1, 2}) {
         const std::size_t first = position == 1 ? 100 : 2100;
         campaign.orders.push_back({campaign.samples[first - 50].time, campaign.samples[first].time,
                                    campaign.samples[first + 1500].time, 1, position, 9.0, false});
     }
+    return campaign;
+}
+
+TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
+    // GIVEN a campaign of two dwells, as it was the first time
+    Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
     estimator::Settings settings;
     const auto once = replay(campaign, settings, {});
     ASSERT_EQ(once.dwells.size(), 2U);
@@ -35,6 +48,82 @@ TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
     double& angle = campaign.samples[900].angle[1];
     angle = std::nextafter(angle, 1.0);
     EXPECT_GT(replay(campaign, settings, {}).different, 0U);
+}
+
+TEST_F(Recording, IsComparedInEveryColumnOfItsDwells) {
+    Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
+    campaign.dwells = replay(campaign, {}, {}).dwells;
+    ASSERT_EQ(campaign.dwells.size(), 2U);
+    const auto difference = [&](const auto& change) {
+        Campaign changed = campaign;
+        change(changed.dwells[1]);
+        const auto replayed = replay(changed, {}, {});
+        EXPECT_EQ(replayed.different, replayed.first_difference.empty() ? 0U : 1U);
+        EXPECT_EQ(replayed.as_recorded(), replayed.first_difference.empty());
+        return replayed.first_difference;
+    };
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.numbers->rate[1] = 7; }),
+                AllOf(StartsWith("run 1 position 2: /dwells/rate: row 2, number 2: found 7, the "
+                                 "replay gives "),
+                      Not(HasSubstr("gives 7"))));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.numbers->sync_arcsec += 1e-9; }),
+                HasSubstr("/dwells/sync_arcsec: row 2: found"));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.summary.used -= 1; }),
+                HasSubstr("/dwells/used: row 2: found"));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.summary.mean_force_g += 1e-9; }),
+                HasSubstr("/dwells/mean_force_g: row 2: found"));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.value[2] += 1e-9; }),
+                HasSubstr("/dwells/value: row 2, D_Ox: found"));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.covariance[31] *= 2; }),
+                HasSubstr("/dwells/covariance: row 2, number 32: found"));
+    EXPECT_THAT(difference([](Dwell& dwell) { dwell.summary.kappa = std::nan(""); }),
+                HasSubstr("/dwells/kappa: row 2: found no number, the replay gives "));
+    // WHEN it was done, and what an older recording lacks, are not
+    EXPECT_EQ(difference([](Dwell& dwell) {
+                  dwell.time += 1;
+                  dwell.numbers.reset();
+              }),
+              "");
+}
+
+TEST_F(Recording, IsComparedWithItsEstimates) {
+    Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
+    campaign.dwells = replay(campaign, {}, {}).dwells;
+    // GIVEN what a recorder saw: in a dwell some samples ago, and after its end
+    dwells::Player player{estimator::Settings{}};
+    rt::DwellOrder order;
+    order.from = campaign.orders[0].from;
+    order.to = campaign.orders[0].to;
+    order.dwell = campaign.orders[0].dwell();
+    player.order(order);
+    const auto see = [&](std::size_t first, std::size_t end, std::size_t at, bool after) {
+        for (std::size_t i = first; i < end; ++i) player.push({&campaign.samples[i], 1});
+        estimator::Estimate e = player.shown();
+        if (!after) player.book().identification().estimate(e);
+        campaign.estimates.push_back({campaign.samples[at].time, e.amplitude_g, e.frequency_hz,
+                                      e.kappa, e.nis_per_dof, e.innovation_arcsec, e.value,
+                                      e.sigma});
+    };
+    see(0, 900, 912, false);
+    see(900, 901, 899, false);  // the recorder was behind
+    see(901, 902, 110, false);  // by far
+    see(902, 1601, 1650, true);
+    auto replayed = replay(campaign, {}, {});
+    EXPECT_EQ(replayed.estimates, 4U);
+    EXPECT_TRUE(replayed.as_recorded()) << replayed.first_difference;
+    // THEN one last bit of any is seen, and named
+    campaign.estimates[1].sigma[3] = std::nextafter(campaign.estimates[1].sigma[3], 0.0);
+    replayed = replay(campaign, {}, {});
+    EXPECT_EQ(replayed.estimates_different, 1U);
+    EXPECT_FALSE(replayed.as_recorded());
+    EXPECT_THAT(replayed.first_difference,
+                StartsWith(std::string("/estimates/sigma: row 2, ") +
+                           estimator::parameter_names()[3] + ": found "));
+    campaign.estimates[3].kappa += 1e-9;
+    EXPECT_EQ(replay(campaign, {}, {}).estimates_different, 2U);
+    // Beside all dwells there is nothing to compare with.
+    for (auto& row : campaign.estimates) row.time = campaign.samples[1900].time;
+    EXPECT_EQ(replay(campaign, {}, {}).estimates, 0U);
 }
 
 TEST_F(Recording, ThatOrdersADwellToEndBeforeItBeginsHasNoSampleInIt) {

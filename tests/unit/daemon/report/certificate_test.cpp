@@ -179,6 +179,7 @@ TEST_F(Certificate, IsRefusedForWhatIsNotValid) {
     EXPECT_THAT(with([&] { campaign_.head.configuration = "unit.type = \"GP-3\"\n"; }),
                 HasSubstr("no serial number"));
     EXPECT_THAT(with([&] { replayed_.different = 1; }), HasSubstr("every bit"));
+    EXPECT_THAT(with([&] { replayed_.estimates_different = 1; }), HasSubstr("every bit"));
     EXPECT_THAT(with([&] { replayed_.compared = 0; }), HasSubstr("every bit"));
     EXPECT_THAT(with([&] { result_["parameters"][7]["value"] = nullptr; }),
                 HasSubstr("D_IOx: found no value"));

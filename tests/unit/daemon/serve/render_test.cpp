@@ -43,6 +43,14 @@ TEST(Render, SaysWhatIsNotThereAndNothingOfNoBroker) {
     EXPECT_FALSE(has(text, "broker") || has(text, "frame to ring")) << text;
 }
 
+TEST(Render, SaysWhatTheArchiveRefuses) {
+    StatusData status = full_status();
+    EXPECT_TRUE(
+        has(joined(render_summary(message_of(status), {}, 120)), "1 REFUSED: unit-1: was changed"));
+    status.archive.refused = 0;
+    EXPECT_FALSE(has(joined(render_summary(message_of(status), {}, 120)), "REFUSED"));
+}
+
 TEST(Render, ShowsWhatCountsOnAWideTerminal) {
     const Rates rates{true, 40.0, 240.0, 37.0};
     const std::string text = joined(render_table(message_of(full_status()), rates, 120));

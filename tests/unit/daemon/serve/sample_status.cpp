@@ -106,8 +106,17 @@ StatusData full_status() {
                "0af1",
                0.5,
                "stop, table takes longer"};
-    s.archive = {
-        "/mnt/archive", true, "the server was gone", "2026-11-24_10-00-00", 2, 4096, 7, 3, 1};
+    s.archive = {"/mnt/archive",
+                 true,
+                 "the server was gone",
+                 "2026-11-24_10-00-00",
+                 2,
+                 4096,
+                 7,
+                 3,
+                 1,
+                 1,
+                 "unit-1: was changed"};
     s.guard = {"/run/vibrig/guard.sock",
                true,
                "late",

@@ -1,17 +1,25 @@
 #include "daemon/serve/status_server.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "daemon/serve/client.hpp"
+#include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_json.hpp"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 #include "tests/unit/daemon/serve/raw_connection.hpp"
 
 namespace vibrig::serve {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 class Server : public testing::Test {
   protected:
@@ -53,6 +61,44 @@ TEST_F(Server, GivesEventsAfterAnId) {
         const Reply reply = client.get(std::string("/api/v1/events?") + bad);
         EXPECT_EQ(reply.status, 400) << bad;
         EXPECT_NE(reply.body.find("expected"), std::string::npos) << reply.body;
+    }
+}
+
+TEST_F(Server, RefusesUnknownKeysOfAQuery) {
+    Client client(path);
+    const auto refusal = [&](const char* target) {
+        const Reply reply = client.get(target);
+        return std::to_string(reply.status) + ' ' + reply.body;
+    };
+    EXPECT_THAT(refusal("/api/v1/events?aftr=3"),
+                AllOf(StartsWith("400"), HasSubstr("found 'aftr', expected after or limit")));
+    EXPECT_THAT(refusal("/api/v1/history?channel=measured_g&form=3"),
+                AllOf(StartsWith("400"), HasSubstr("found 'form', expected channel or from")));
+    EXPECT_THAT(refusal("/api/v1/stream?rate=3"), AllOf(StartsWith("400"), HasSubstr("'rate'")));
+    EXPECT_THAT(refusal("/api/v1/status?pretty"),
+                AllOf(StartsWith("400"), HasSubstr("found 'pretty', expected none")));
+    // A command too, but for the one that stops: it is never refused for what is beside it.
+    const auto command = [&](const char* kind) {
+        return client
+            .post("/api/v1/commands?x=1", std::string(R"({"by":"Ada","kind":")") + kind + "\"}")
+            .status;
+    };
+    EXPECT_EQ(command("start"), 400);
+    EXPECT_TRUE(source.requests().empty());
+    EXPECT_EQ(command("abort"), 200);
+}
+
+TEST_F(Server, TakesTheKeysThatItsDescriptionHas) {
+    Client client(path);
+    const auto paths = nlohmann::json::parse(openapi_json())["paths"];
+    for (const auto& [of, methods] : paths.items()) {
+        if (!methods.contains("get")) continue;
+        std::string query;
+        for (const auto& one : methods["get"]["parameters"])
+            query += '&' + one["name"].get<std::string>() + "=1";
+        if (query.empty()) continue;
+        const Reply reply = client.get(of + '?' + query.substr(1));
+        EXPECT_THAT(reply.body, Not(HasSubstr("query: "))) << of;
     }
 }
 

@@ -1,0 +1,58 @@
+#include "daemon/archive/verify.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/journal/database.hpp"
+#include "tests/unit/daemon/archive/archived.hpp"
+
+namespace vibrig::archive {
+namespace {
+
+using ::testing::Contains;
+using ::testing::IsEmpty;
+
+class Verify : public Archived {
+  protected:
+    [[nodiscard]] std::vector<std::string> found(bool quick = false) const {
+        std::vector<std::string> texts;
+        for (const auto& one : verify(place(), "", "", quick, {}).findings)
+            texts.push_back(one.what + ": " + one.text);
+        return texts;
+    }
+    void edit(const char* sql) const { journal::Database(place().index).execute(sql); }
+};
+
+TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
+    add();
+    EXPECT_THAT(found(), IsEmpty());
+    const std::string file = place().index, folder = (lab() / "rig" / "test-1").string();
+    // WHEN somebody edits one value of the index, THEN file, column and both values are named
+    const auto differs = [&](const char* edit_it, const std::string& words) {
+        edit(edit_it);
+        EXPECT_THAT(found(), Contains("index differs: " + file + ": " + words + " of " + folder))
+            << edit_it;
+        EXPECT_THAT(found(true), IsEmpty()) << "of lengths alone";
+        static_cast<void>(deliver(folder, place(), "rig", {}));  // mends it
+        EXPECT_THAT(found(), IsEmpty()) << edit_it;
+    };
+    differs("UPDATE coefficient SET value = 3 WHERE position = 0",
+            "coefficient.value of D_Fx of rig/test-1: found \"3\", expected \"2.5\"");
+    differs("DELETE FROM coefficient WHERE position = 1",
+            std::string("coefficient.expanded of ") + estimator::parameter_names()[1] +
+                " of rig/test-1: found nothing, expected \"0.4\"");
+    differs("UPDATE result SET verdict = 'doubtful'",
+            "result.verdict of rig/test-1: found \"doubtful\", expected \"valid\"");
+    differs("UPDATE result SET unit_serial = '0018'",
+            "result.unit_serial of rig/test-1: found \"0018\", expected \"0017\"");
+    differs("UPDATE campaign SET started_utc_ns = started_utc_ns + 1",
+            "campaign.started_utc_ns of rig/test-1: found \"1700001000000000001\", expected "
+            "\"1700001000000000000\"");
+}
+
+}  // namespace
+}  // namespace vibrig::archive
