@@ -17,6 +17,11 @@ namespace vibrig::record {
 namespace fs = std::filesystem;
 using drivers::Time;
 
+namespace {
+/// Of missing parts, in one message.
+constexpr std::size_t kMostMissing = 5;
+}  // namespace
+
 std::string part_name(int part) {
     return part == 1 ? "campaign.h5" : fmt::format("campaign-{}.h5", part);
 }
@@ -229,15 +234,17 @@ Campaign read_parts(const std::string& path) {
         own != there.end() && fs::path(own->second).filename() == fs::path(path).filename();
     std::map<int, std::string> parts = among ? there : std::map{std::pair{first.part, path}};
     const int last = parts.rbegin()->first;
-    std::string missing;
-    for (int part = 1; part <= last; ++part) {
-        if (!parts.contains(part)) missing += (missing.empty() ? "" : ", ") + part_name(part);
-    }
+    // As many as `part` says, which may be any number in a file that somebody changed.
+    const int absent = last - static_cast<int>(parts.size());
+    std::vector<std::string> missing;
+    for (int part = 1; part <= last && missing.size() < kMostMissing; ++part)
+        if (!parts.contains(part)) missing.push_back(part_name(part));
+    if (absent > static_cast<int>(missing.size()))
+        missing.push_back(fmt::format("{} more", absent - static_cast<int>(missing.size())));
     if (!missing.empty())
-        throw std::runtime_error(
-            fmt::format("{}: missing {} of campaign {}, expected all {} parts "
-                        "(found {})",
-                        folder, missing, first.campaign, last, fmt::join(names_of(parts), ", ")));
+        throw std::runtime_error(fmt::format(
+            "{}: missing {} of campaign {}, expected all {} parts (found {})", folder,
+            fmt::join(missing, ", "), first.campaign, last, fmt::join(names_of(parts), ", ")));
     Campaign campaign;
     for (const auto& [number, file] : parts) {
         Campaign part = read_with_summary(file);

@@ -51,6 +51,17 @@ class Lies : public Parts {
     }
 };
 
+TEST_F(Lies, APartOfAnyNumberIsRefusedAtOnce) {
+    attribute("part", 2'147'483'647);
+    try {
+        static_cast<void>(read_campaign(path()));
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_THAT(error.what(), HasSubstr("missing campaign.h5, campaign-2.h5, "));
+        EXPECT_THAT(error.what(), HasSubstr("expected all 2147483647 parts"));
+    }
+}
+
 TEST_F(Lies, OfALinkAreRefusedWhereverItLeads) {
     constexpr const char* kTimes = "/samples/time_ns";
     instead(kTimes, [](hid_t file) {
