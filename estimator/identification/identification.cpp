@@ -580,12 +580,6 @@ void Identification::set_noise(const NoiseLevels& levels) noexcept {
     }
 }
 const NoiseLevels& Identification::noise() const noexcept { return impl_->noise; }
-Result Identification::result() const { return impl_->result(); }
-
-const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
-
-const std::vector<DwellMeans>& Identification::means() const noexcept { return impl_->means; }
-
 void Identification::solved(Estimate& out) const noexcept { impl_->solved(out); }
 
 std::vector<double> Identification::covariance() const {

@@ -270,4 +270,10 @@ Result Identification::Impl::result() const {
     return out;
 }
 
+Result Identification::result() const { return impl_->result(); }
+
+const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
+
+const std::vector<DwellMeans>& Identification::means() const noexcept { return impl_->means; }
+
 }  // namespace vibrig::estimator
