@@ -27,10 +27,17 @@ namespace vibrig::proto {
     return row[b.size()];
 }
 
-/// A key or column that is hardly anything but `known`, misspelt: one letter in three is another.
+/// A key or column that is hardly anything but `known`, misspelt: one letter is another, of more
+/// than six two, or the unit is left out (frequency). What has a word more (spin_frequency_hz,
+/// profile_id) is something else.
 [[nodiscard]] inline bool misspelt(std::string_view name, std::string_view known) {
-    constexpr std::size_t kLongest = 100, kLettersPerEdit = 3;
-    return name.size() <= kLongest && edits(name, known) * kLettersPerEdit <= name.size();
+    constexpr std::size_t kLongest = 100, kShort = 6, kLettersPerEdit = 3;
+    if (name.empty() || name.size() > kLongest) return false;
+    if (name.size() < known.size() && known[name.size()] == '_' &&
+        same_name(name, known.substr(0, name.size())))
+        return true;
+    const std::size_t found = edits(name, known);
+    return found <= (name.size() > kShort ? 2U : 1U) && found * kLettersPerEdit <= name.size();
 }
 
 }  // namespace vibrig::proto

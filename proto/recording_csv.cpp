@@ -275,7 +275,8 @@ class RecordingReader::Rows {
 
     /// Of a line without an end, which may be cut.
     void check_end() {
-        const bool read = fields_.size() == roles_.size() && roles_.back() != kNone;
+        // A profile, a level, a role may be left empty; an empty frequency would be rest.
+        const bool read = fields_.size() == roles_.size() && roles_.back() < kProfile;
         const auto cut = cut_fields(fields_.size(), roles_.size(), fields_.back(), read);
         if (!cut.empty()) fail("", cut);
         warning_ = tell_open_end(path_ + ":" + std::to_string(lines_.line()), fields_.back());

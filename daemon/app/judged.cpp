@@ -64,8 +64,7 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
     out.spectrum = std::move(found.spectrum);
     // With the settings of the campaign, whatever noise was found: they name what cannot be.
     auto contradiction = estimator::commissioning::contradiction_of(
-        settings, anew ? anew->result.dwells : result.dwells, anew ? anew->means : means,
-        anew ? anew->rows : all_rows);
+        settings, anew ? anew->result.dwells : result.dwells, anew ? anew->means : means);
     out.contradictions = std::move(contradiction.warnings);
     uncertainty::contradict(out.assessed.verdict, contradiction.first);
     if (!anew) return out;

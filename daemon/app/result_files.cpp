@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <sys/stat.h>
 
+#include <ctime>
 #include <fstream>
 #include <system_error>
 #include <utility>
@@ -24,9 +25,10 @@ void ResultFiles::begin() {
 
 void ResultFiles::put_aside(const std::filesystem::path& path) {
     struct stat found {};
-    if (::stat(path.c_str(), &found) != 0) return;
-    const std::string dated = fmt::format("{}-{:%Y%m%dT%H%M%SZ}", path.stem().string(),
-                                          fmt::gmtime(found.st_mtim.tv_sec));
+    std::tm utc{};
+    if (::stat(path.c_str(), &found) != 0 || ::gmtime_r(&found.st_mtim.tv_sec, &utc) == nullptr)
+        return;
+    const std::string dated = fmt::format("{}-{:%Y%m%dT%H%M%SZ}", path.stem().string(), utc);
     std::error_code error;
     auto to = folder_ / (dated + ".json");
     for (int i = 2; std::filesystem::exists(to, error); ++i)

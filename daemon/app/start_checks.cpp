@@ -149,6 +149,7 @@ std::vector<std::string> check_plan(const configuration::Configuration& configur
         warnings.emplace_back(
             "positions of lists and plans are gimbal angles, converted by platform.encoder_sign "
             "and encoder_zero_deg: a file that states what the encoders show is to be mended");
+    if (!campaign.plan_warning.empty()) warnings.push_back(proto::printable(campaign.plan_warning));
     if (const double planned_s = campaign.planned_dwell_s;
         planned_s > 0 && std::abs(planned_s - campaign.dwell_s) > kSameDwell * campaign.dwell_s)
         warnings.push_back(

@@ -48,18 +48,19 @@ std::string read_text(const fs::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// On the disk before anything that rests on it happens.
-void write_mark(const fs::path& path, const std::string& text) {
+/// On the disk before anything that rests on it happens. False: the disk does not take it.
+bool write_mark(const fs::path& path, const std::string& text) {
     std::error_code error;
     fs::create_directories(path.parent_path(), error);
     fs::path fresh = path;
     fresh += ".new";
     const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (file < 0) return;  // delivered again, to find it there
+    if (file < 0) return false;  // delivered again, to find it there
     const auto size = static_cast<ssize_t>(text.size());
     const bool good = ::write(file, text.data(), text.size()) == size && ::fsync(file) == 0;
     ::close(file);
     if (good) fs::rename(fresh, path, error);
+    return good && !error;
 }
 
 /// Why `vibrig archive add --json` refused it; empty: it did not.
@@ -244,12 +245,17 @@ std::vector<Outbox::Campaign> Outbox::scan() const {
     return found;
 }
 
-void Outbox::put_aside(const Campaign& campaign, const std::string& why) {
-    write_mark(fs::path(recordings_) / kMarks / kRefused / campaign.key, campaign.state + why);
+bool Outbox::put_aside(const Campaign& campaign, const std::string& why) {
+    std::string where;
+    for (const auto& [option, value] :
+         {std::pair{"--archive", settings_.folder}, std::pair{"--index", settings_.index}})
+        if (!value.empty()) where += fmt::format("{} {} ", option, value);
     if (told_.insert(campaign.key + campaign.state + why).second)
         event_(Severity::alarm, fmt::format("{} is refused by the archive and put aside; once that "
-                                            "is put right, vibrig archive add {}: {}",
-                                            campaign.key, campaign.path, why));
+                                            "is put right, vibrig archive add {}{}: {}",
+                                            campaign.key, where, campaign.path, why));
+    return write_mark(fs::path(recordings_) / kMarks / kRefused / campaign.key,
+                      campaign.state + why);
 }
 
 Outbox::Outcome Outbox::deliver(const Campaign& campaign) {
@@ -265,11 +271,13 @@ Outbox::Outcome Outbox::deliver(const Campaign& campaign) {
     const bool good = run.status == 0;
     if (stop_.load() && !good) return Outcome::failed;
     const std::string refused = good ? "" : refusal_in(run.out);
+    bool noted = true;
     if (!refused.empty()) {
-        put_aside(campaign, refused);
+        noted = put_aside(campaign, refused);
         failed_.erase(campaign.key);
     } else if (good) {
-        write_mark(fs::path(recordings_) / kMarks / campaign.key, campaign.print);
+        static_cast<void>(
+            write_mark(fs::path(recordings_) / kMarks / campaign.key, campaign.print));
         failed_.erase(campaign.key);
         if (!std::exchange(reported_, "").empty())
             event_(Severity::info, "can be delivered to again");
@@ -290,7 +298,10 @@ Outbox::Outcome Outbox::deliver(const Campaign& campaign) {
         s.note = s.good ? "" : run.error;
         good ? ++s.delivered : ++s.failures;
     });
-    return good ? Outcome::delivered : refused.empty() ? Outcome::failed : Outcome::refused;
+    // What cannot be noted comes again, not at once.
+    return good                        ? Outcome::delivered
+           : refused.empty() || !noted ? Outcome::failed
+                                       : Outcome::refused;
 }
 
 void Outbox::tell_moved(const std::string& line) {

@@ -65,7 +65,8 @@ class Outbox {
     void loop();
     [[nodiscard]] std::vector<Campaign> scan() const;
     Outcome deliver(const Campaign& campaign);
-    void put_aside(const Campaign& campaign, const std::string& why);
+    /// False: it is not noted, and comes again.
+    bool put_aside(const Campaign& campaign, const std::string& why);
     void tell_moved(const std::string& line);
     void ask_history();
     void ask_type();

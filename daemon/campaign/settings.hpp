@@ -142,6 +142,7 @@ struct Settings {
     /// The order itself: places in the list of levels, each with all positions; empty: that list.
     std::vector<std::size_t> sequence;
     std::string plan;            ///< plan file; empty: every position at every level
+    std::string plan_warning;    ///< of the plan file, at its reading; empty: none
     double planned_dwell_s = 0;  ///< that the plan file was made for; 0: it states none
     std::vector<Stop> stops;     ///< of the plan file, in its order
     bool identify_all = true;    ///< refuse a campaign that cannot determine all 30 coefficients

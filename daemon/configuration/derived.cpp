@@ -62,6 +62,7 @@ void take_plan(Configuration& c) {
     };
     const auto plan = plan::read_plan_file(c.campaign.plan, transmission, c.estimator.frequency_hz);
     c.campaign.planned_dwell_s = plan.dwell_s.value_or(0);
+    c.campaign.plan_warning = plan.warning;
     for (const auto& run : plan.runs) {
         if (!run.profile.empty()) {
             c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run));

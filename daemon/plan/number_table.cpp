@@ -48,7 +48,7 @@ std::vector<std::string> names_of(const std::vector<std::string_view>& header,
     return names;
 }
 
-/// Of the last line, which has no end. `read`: its last column is one that is looked at.
+/// Of the last line, which has no end. `read`: its last column has to be there.
 std::string open_end(const std::vector<std::string_view>& fields, std::size_t columns, bool read,
                      const std::string& place) {
     const auto cut = proto::cut_fields(fields.size(), columns, fields.back(), read);
@@ -120,7 +120,7 @@ NumberTable read_table(const std::string& text, const std::string& path, const T
         }
         if (open)
             table.warning = open_end(fields, table.names.size(),
-                                     among(known_to(form), table.names.back()), place);
+                                     among(form.numbers, table.names.back()), place);
         std::vector<double> row(table.names.size(), std::nan(""));
         std::vector<std::string> words(table.names.size());
         for (std::size_t c = 0; c < table.names.size(); ++c) {

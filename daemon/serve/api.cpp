@@ -214,7 +214,9 @@ ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
 }
 
 bool Api::is_stop(const ApiRequest& request, const Caller& caller) {
-    if (request.method != "POST" || request.target != kCommands || caller.role < Role::operate ||
+    const std::string_view path =
+        std::string_view(request.target).substr(0, request.target.find('?'));
+    if (request.method != "POST" || path != kCommands || caller.role < Role::operate ||
         depth_of(request.body) > kDeepestBody)
         return false;
     try {

@@ -13,21 +13,13 @@ namespace {
 /// As the filter: beyond it the level of a dwell is not known.
 constexpr double kMeanForce_g = 0.02;
 
-/// What shook at another frequency, or is held out, drifts otherwise than the coefficients say.
-bool is_apart(const DwellSummary& dwell, const std::vector<DwellRow>& rows) {
-    return std::ranges::any_of(rows, [&dwell](const DwellRow& row) {
-        return row.apart && row.run == dwell.run && row.position == dwell.position;
-    });
-}
-
 }  // namespace
 
 Contradiction contradiction_of(const Settings& settings, const std::vector<DwellSummary>& dwells,
-                               const std::vector<DwellMeans>& means,
-                               const std::vector<DwellRow>& rows) {
+                               const std::vector<DwellMeans>& means) {
     std::vector<DwellMean> known;
     for (std::size_t i = 0; i < std::min(dwells.size(), means.size()); ++i) {
-        if (!means[i].known() || is_apart(dwells[i], rows)) continue;
+        if (!means[i].known()) continue;
         const bool level = std::abs(dwells[i].mean_force_g - 1) <= kMeanForce_g;
         known.push_back(means[i].mean(level ? dwells[i].kappa : 1, level));
     }

@@ -15,11 +15,9 @@ struct Contradiction {
     std::string first;                  ///< empty: the configuration fits
     std::vector<std::string> warnings;  ///< all of them, and which keys would explain them
 };
-/// `dwells` and `means` as the identification has them, one for one; `rows`: of all dwells, those
-/// apart from the result included. Throws SettingsError.
+/// `dwells` and `means` as the identification has them, one for one. Throws SettingsError.
 [[nodiscard]] Contradiction contradiction_of(const Settings& settings,
                                              const std::vector<DwellSummary>& dwells,
-                                             const std::vector<DwellMeans>& means,
-                                             const std::vector<DwellRow>& rows);
+                                             const std::vector<DwellMeans>& means);
 
 }  // namespace vibrig::estimator::commissioning

@@ -1,4 +1,5 @@
 // Which single key, changed, would explain dwells that contradict their configuration.
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -19,8 +20,10 @@ constexpr double kForceSigma_g = 3e-3;
 /// Linear drift terms are believed to be about so large, deg/h/g: what the sign of the latitude is
 /// recognised by.
 constexpr double kLinearSigma = 2, kEarthFixed = 1e-3;
-/// Fewer attitudes than these are explained by zeros, whatever is wrong.
+/// Verticals that spread less, in two directions of the platform, are explained by zeros, whatever
+/// is wrong; the mean square of three axes up and down is 1/3 in each.
 constexpr std::size_t kZeroDwells = 4;
+constexpr double kZeroSpread = 0.05;
 constexpr double kLargestZero_g = 0.03;
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 
@@ -128,9 +131,18 @@ class Search {
             for (int k = 0; k < 3; ++k)
                 matrix(i, k) = as_is_.accelerometer_matrix[static_cast<std::size_t>(i)]
                                                           [static_cast<std::size_t>(k)];
-        Eigen::Vector3d off = Eigen::Vector3d::Zero();
-        for (const Verticals& v : verticals(as_is_, dwells_)) off += v.force - v.encoders;
-        off = matrix.inverse() * off / static_cast<double>(dwells_.size());
+        const auto count = static_cast<double>(dwells_.size());
+        Eigen::Vector3d off = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();
+        Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
+        for (const Verticals& v : verticals(as_is_, dwells_)) {
+            off += (v.force - v.encoders) / count;
+            middle += v.encoders / count;
+            square += v.encoders * v.encoders.transpose() / count;
+        }
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(square -
+                                                                    middle * middle.transpose());
+        if (!(spread.eigenvalues()[1] > kZeroSpread)) return;
+        off = matrix.inverse() * off;
         if (!(off.cwiseAbs().maxCoeff() <= kLargestZero_g)) return;
         Settings s = as_is_;
         for (std::size_t k = 0; k < 3; ++k) s.accelerometer_zero_g[k] += off[static_cast<int>(k)];

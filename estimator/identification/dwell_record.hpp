@@ -12,7 +12,7 @@ namespace vibrig::estimator {
 /// Counts of the dwell in progress; samples = used + rejected at any time nothing is buffered.
 struct DwellRecord {
     DwellInfo info;
-    DwellMeans means;  ///< of its readings as they came; nothing of a sweep
+    DwellMeans means;  ///< of its readings as they came, but for a resolver that stands still
     Seen seen;         ///< of this vibration by the accelerometers
     std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
     std::uint32_t gated = 0;  ///< of the rejected: angles too far from the predicted ones

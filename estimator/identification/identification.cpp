@@ -204,7 +204,6 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
     }
     bad_times_in_a_row_ = 0;
     if (swept_) return leave_alone(measurement);
-    record_.means.add(measurement);
     if (!first && (restart || dt > kLongestPause_s)) {
         end_stretch();
         active_->filter.begin_dwell();
@@ -214,6 +213,8 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
     if (reading.angles_good && stuck_.stuck(measurement.angle_rad)) {
         reading.angles_good = false;
         ++record_.stuck;
+    } else if (!apart_) {
+        record_.means.add(measurement);
     }
     if (reading.force_good) {
         ++record_.forces;
@@ -501,7 +502,8 @@ DwellSummary Identification::Impl::end_dwell(bool cut_short) noexcept {
     ++dwells_ended;
     if (dwells.size() < dwells.capacity()) {
         dwells.push_back(verdict.summary);
-        means.push_back(record_.means);
+        // What was cut off at the end of its range has another mean.
+        means.push_back(record_.saturated_axis >= 0 ? DwellMeans() : record_.means);
     } else {
         ++dwells_not_kept;
     }

@@ -87,7 +87,8 @@ class Identification {
     [[nodiscard]] Result result() const;
     /// Those of result() and, in their order, those apart from them.
     [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
-    /// Of each dwell of result().dwells, in their order; nothing is known of a sweep.
+    /// Of each dwell of result().dwells, in their order; nothing is known of one that is apart (see
+    /// DwellRow), and of one whose accelerometers were at the end of their range.
     [[nodiscard]] const std::vector<DwellMeans>& means() const noexcept;
     /// Covariance of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not
     /// they are observable. Allocates.

@@ -132,13 +132,13 @@ void check_points(const Breakpoints& points, const std::string& place, Points wh
 
 void refuse_one_frequency_twice(const Breakpoints& sines, const std::string& place) {
     // Closer ones beat with a period longer than a dwell.
-    constexpr double kSame = 1e-4;
+    constexpr double kSame_hz = 0.01;
     std::vector<std::pair<double, std::size_t>> sorted;
     for (std::size_t i = 0; i < sines.size(); ++i) sorted.emplace_back(sines[i].first, i);
     std::ranges::sort(sorted);
     for (std::size_t k = 1; k < sorted.size(); ++k) {
         const auto [low, high] = std::minmax(sorted[k - 1].second, sorted[k].second);
-        if (sorted[k].first - sorted[k - 1].first > kSame * sorted[k].first) continue;
+        if (sorted[k].first - sorted[k - 1].first >= kSame_hz) continue;
         throw SettingsError(
             place + "[" + std::to_string(high) + "]: found " + text_of(sines[high].first) +
             " Hz as in [" + std::to_string(low) + "], expected one sine of that frequency with " +

@@ -112,7 +112,12 @@ int add(const AddOptions& o) {
                 static_cast<void>(tell_missing_raw(folder));
                 tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
                               history.size(), o.json);
-                if (const auto why = archive::try_again(folder); !why.empty())
+                // Where it lies already nobody has taken it.
+                std::error_code unknown;
+                const bool here = std::filesystem::equivalent(
+                    at.place.folder, std::filesystem::weakly_canonical(folder).parent_path(),
+                    unknown);
+                if (const auto why = here ? "" : archive::try_again(folder); !why.empty())
                     std::cerr << why << '\n';
             } catch (const std::exception& error) {
                 // vibrigd tells it from a failure by this line.

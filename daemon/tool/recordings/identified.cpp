@@ -58,7 +58,7 @@ void tell_doubts(const estimator::Settings& settings,
     for (const auto& doubt : estimator::doubtful_keys(settings))
         warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " + doubt.expected);
     const auto contradiction = estimator::commissioning::contradiction_of(
-        settings, found.result.dwells, identification.means(), identification.rows());
+        settings, found.result.dwells, identification.means());
     warnings.insert(warnings.end(), contradiction.warnings.begin(), contradiction.warnings.end());
     found.contradiction = contradiction.first;
 }

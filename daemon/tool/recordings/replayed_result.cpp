@@ -32,7 +32,7 @@ std::string not_as_recorded(const record::Campaign& campaign, const record::Repl
 std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,
                            estimator::uncertainty::Verdict& verdict) {
     const auto found = estimator::commissioning::contradiction_of(settings, replayed.result.dwells,
-                                                                  replayed.means, replayed.rows);
+                                                                  replayed.means);
     auto& warnings = replayed.result.warnings;
     warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
     estimator::uncertainty::contradict(verdict, found.first);
