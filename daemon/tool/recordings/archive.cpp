@@ -71,6 +71,15 @@ struct AddOptions {
     ArchiveOptions where = {};
 };
 
+/// vibrigd tries it again, unless it was taken where it lies: that nobody had refused.
+void no_longer_refused(const std::string& folder, const std::string& archive) {
+    std::error_code unknown;
+    if (std::filesystem::equivalent(
+            archive, std::filesystem::weakly_canonical(folder).parent_path(), unknown))
+        return;
+    if (const auto why = archive::try_again(folder); !why.empty()) std::cerr << why << '\n';
+}
+
 int add(const AddOptions& o) {
     Whereabouts at = whereabouts_of(o.where);
     if (at.place.folder.empty()) {
@@ -112,13 +121,7 @@ int add(const AddOptions& o) {
                 static_cast<void>(tell_missing_raw(folder));
                 tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
                               history.size(), o.json);
-                // Where it lies already nobody has taken it.
-                std::error_code unknown;
-                const bool here = std::filesystem::equivalent(
-                    at.place.folder, std::filesystem::weakly_canonical(folder).parent_path(),
-                    unknown);
-                if (const auto why = here ? "" : archive::try_again(folder); !why.empty())
-                    std::cerr << why << '\n';
+                no_longer_refused(folder, at.place.folder);
             } catch (const std::exception& error) {
                 // vibrigd tells it from a failure by this line.
                 if (dynamic_cast<const archive::Refused*>(&error) != nullptr && o.json)
