@@ -93,7 +93,7 @@ def restarted(checks, programs, folder):
         rig.wait_for(r.measuring, 30)
         for command in ("arm", "start"):
             rig.tool(command, "--by", "tester")
-        rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 3 and s["campaign"]["state"] == "slewing", 120)
+        rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 3, 120)
         rig.daemon.process.kill()
         rig.daemon.process.wait()
         done = rig.positions_done()   # the journal is written behind
