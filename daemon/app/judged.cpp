@@ -62,7 +62,7 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
              : tool::assess(settings, {}, result, all_rows, std::move(shaken));
     out.assessed = std::move(found.assessed);
     out.spectrum = std::move(found.spectrum);
-    // With the settings of the campaign, whatever noise was found: they name what cannot be.
+    // With the campaign's own noise, as a replay of the recording has it, whatever noise was found.
     auto contradiction = estimator::commissioning::contradiction_of(
         settings, anew ? anew->result.dwells : result.dwells, anew ? anew->means : means);
     out.contradictions = std::move(contradiction.warnings);

@@ -385,7 +385,8 @@ def check_contradiction(checks, programs, folder):
                  any(w.startswith("suspects, best first: accelerometer.zero_g: about [0.01") for w in result["warnings"]),
                  "the daemon's own result says that the configuration does not fit", f"{result['verdict']} {result['warnings']}")
     checks.check(status["verdict"]["word"] == "not valid", "and so does its status", str(status.get("verdict")))
-    checks.equal(tool(rig, "replay", recording, "--json").stdout.strip(), written, "a replay gives that result to the last bit")
+    for command in ("replay", "identify"):
+        checks.equal(tool(rig, command, recording, "--json").stdout.strip(), written, f"{command} gives that result to the last bit")
     with open(os.path.join(folder, "paper.toml"), "w", encoding="utf-8") as file:
         file.write('number = "1"\n[laboratory]\nname = "L"\n[customer]\nname = "C"\n')
     for command in (("identify", recording), ("replay", recording), ("report", recording, "-o", "r.html"),

@@ -462,8 +462,8 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
                      });
     Found found;
     found.result = anew ? anew->result() : identification.result();
-    tell_doubts(settings, identification, found);
     record::qualify(campaign, dwells.size(), found.result);
+    tell_doubts(settings, identification, found);
     found.rows = identification.rows();
     return found;
 }
