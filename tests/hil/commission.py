@@ -770,9 +770,13 @@ def nothing_is_written(checks, programs, folder):
         time.sleep(0.5)
         known = len(u.proxy.writes)
         u.rig.tool("abort", "--by", "Bo")
+
+        def stopped(_):
+            return any(w[1] <= modbus_proxy.RUN < w[1] + len(w[2]) and w[2][-1] == 0 for w in u.proxy.writes[known:])
+
+        u.rig.wait_for(stopped, 10)   # it is accepted before it is written
+        checks.check(stopped(None), "but a stop is", (u.proxy.writes[known:known + 5], child.text()))
         child.end()
-        stops = [w for w in u.proxy.writes[known:] if w[1] <= modbus_proxy.RUN < w[1] + len(w[2]) and w[2][-1] == 0]
-        checks.check(stops, "but a stop is, at once", u.proxy.writes[known:known + 5])
     finally:
         over.set()
         u.rig.stop()
@@ -1188,11 +1192,13 @@ def real(checks, programs, folder):
             json.dump(ANSWERS, file)
         scripted = rig.tool("commission", "--by", "Ada", "--by-hand", "--answers", answers)
         checks.check(scripted.returncode == 2 and "persons answer on a real rig" in scripted.stderr, "and no script answers", scripted.stderr)
+        rig.wait_for(lambda s: r.state_of(s) == "idle", 20)
         before = after_slews(rig)
         unasked = rig.tool("commission", "--by", "Ada")   # nobody answers
-        after = rig.status()
+        after = rig.wait_for(lambda s: r.state_of(s) == "idle", 20) or rig.status()   # a status is shown for a moment
         checks.check("power stage off?" in unasked.stdout and unasked.returncode == 1 and not_moved(before, after) and r.state_of(after) == "idle",
-                     "by command, too; without a permission nothing moves", unasked.stdout + unasked.stderr)
+                     "by command, too; without a permission nothing moves",
+                     (unasked.stdout + unasked.stderr, unasked.returncode, r.state_of(after), readings(before), readings(after)))
         t = Terminal(rig)
         for question, answer in (("power stage off?", "yes"), ("count in", "yes"), ("or free", ""), ("hold where it is", "h"),
                                  ("present readings", "y"), ("OUTER", "y"), ("Which gimbal turned?", "outer"), ("INNER", "no")):

@@ -82,9 +82,13 @@ int show_events(const EventOptions& options) {
         while (print_new(client, cursor, options.json)) {
         }
     };
-    catch_up();
+    if (!options.follow) {
+        catch_up();
+        return 0;
+    }
+    print_new(client, cursor, options.json);  // who never answered is nobody to wait for
     bool gone = false;
-    while (options.follow && std::cout.good()) {
+    while (std::cout.good()) {
         try {
             catch_up();
             if (std::exchange(gone, false)) std::cerr << "vibrig: vibrigd answers again\n";

@@ -6,9 +6,11 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
-#include <sstream>
+#include <iterator>
+#include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "daemon/serve/status_json.hpp"
@@ -49,6 +51,13 @@ class Tool : public testing::Test {
     void show(const StatusData& status) {
         source.set(status);
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+
+    void tell(const std::string& text) {
+        EventRecord event;
+        event.source = "campaign";
+        event.text = text;
+        source.log.append(event);
     }
 
     FakeSource source;
@@ -225,12 +234,7 @@ TEST_F(Tool, WatchFindsARestartedDaemonAgain) {
 
 TEST_F(Tool, ListsEvents) {
     const StatusServer server(source, path);
-    for (int i = 1; i <= 2500; ++i) {
-        EventRecord event;
-        event.source = "campaign";
-        event.text = "event " + std::to_string(i);
-        source.log.append(event);
-    }
+    for (int i = 1; i <= 2500; ++i) tell("event " + std::to_string(i));
     const Outcome outcome = vibrig("events" + at);
     EXPECT_EQ(outcome.code, 0);
     EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 2500);
@@ -239,44 +243,66 @@ TEST_F(Tool, ListsEvents) {
     EXPECT_EQ(json.output.rfind("{\"id\":\"1\"", 0), 0u) << json.output.substr(0, 200);
 }
 
-TEST_F(Tool, FollowsEventsAcrossARestart) {
-    auto server = std::make_unique<StatusServer>(source, path);
-    const auto tell = [this](const std::string& text) {
-        EventRecord event;
-        event.source = "campaign";
-        event.text = text;
-        source.log.append(event);
-    };
-    const std::string file = folder.file("events");
-    const auto printed = [&](const std::string& text) {
+/// `vibrig events --follow`, until it goes out of scope.
+class Follower {
+  public:
+    Follower(const std::string& at, std::string file) : file_(std::move(file)) {
+        const std::string command = "exec " + std::string(VIBRIG_PROGRAM) + " events --follow" +
+                                    at + " >" + file_ + " 2>&1";
+        process_ = fork();
+        if (process_ == 0) {
+            execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+            _exit(127);
+        }
+    }
+    ~Follower() {
+        kill(process_, SIGKILL);
+        waitpid(process_, nullptr, 0);
+    }
+    Follower(const Follower&) = delete;
+    Follower& operator=(const Follower&) = delete;
+
+    [[nodiscard]] testing::AssertionResult printed(const std::string& text) const {
+        std::string all;
         for (int i = 0; i < 3000; ++i) {
-            std::ifstream input(file);
-            std::ostringstream all;
-            all << input.rdbuf();
-            if (all.str().find(text) != std::string::npos) return true;
+            std::ifstream input(file_);
+            all.assign(std::istreambuf_iterator<char>(input), {});
+            if (all.find(text) != std::string::npos) return testing::AssertionSuccess();
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
         }
-        return false;
-    };
-    tell("first event");
-    const std::string command =
-        "exec " + std::string(VIBRIG_PROGRAM) + " events --follow" + at + " >" + file + " 2>&1";
-    const pid_t follower = fork();
-    if (follower == 0) {
-        execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-        _exit(127);
+        return testing::AssertionFailure() << '"' << text << "\" is not in:\n" << all;
     }
-    EXPECT_TRUE(printed("first event"));
+
+  private:
+    std::string file_;
+    pid_t process_ = -1;
+};
+
+TEST_F(Tool, FollowsEventsAcrossARestart) {
+    auto server = std::make_unique<StatusServer>(source, path);
+    tell("first event");
+    const Follower follower(at, folder.file("events"));
+    EXPECT_TRUE(follower.printed("first event"));
     tell("second event");
-    EXPECT_TRUE(printed("second event"));
+    EXPECT_TRUE(follower.printed("second event"));
     server.reset();
-    EXPECT_TRUE(printed("trying again"));
+    EXPECT_TRUE(follower.printed("trying again"));
     server = std::make_unique<StatusServer>(source, path);
-    EXPECT_TRUE(printed("the daemon has started anew"));
+    EXPECT_TRUE(follower.printed("the daemon has started anew"));
     tell("third event");
-    EXPECT_TRUE(printed("third event"));
-    kill(follower, SIGKILL);
-    waitpid(follower, nullptr, 0);
+    EXPECT_TRUE(follower.printed("third event"));
+}
+
+TEST_F(Tool, FollowsEventsThoughItsSecondQuestionIsNotAnswered) {
+    ServerLimits limits;
+    limits.requests_per_s = 1;
+    const StatusServer server(source, path, limits);
+    tell("first event");
+    const Follower follower(at, folder.file("events"));
+    EXPECT_TRUE(follower.printed("first event"));
+    EXPECT_TRUE(follower.printed("trying again"));
+    tell("second event");
+    EXPECT_TRUE(follower.printed("second event"));
 }
 
 /// On a terminal, as a person has it.
