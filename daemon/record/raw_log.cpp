@@ -251,7 +251,6 @@ struct RawReader::Input {
     std::vector<char> from = std::vector<char>(ZSTD_DStreamInSize());
     std::vector<char> to = std::vector<char>(ZSTD_DStreamOutSize());
     ZSTD_inBuffer there{nullptr, 0, 0};
-    std::size_t left = 0;  ///< of a frame of zstd
 };
 
 RawReader::RawReader(std::string path) : path_(std::move(path)), input_(std::make_unique<Input>()) {
@@ -266,18 +265,15 @@ bool RawReader::next(std::string_view& piece) {
     for (;;) {
         while (in.packed && in.there.pos < in.there.size) {
             ZSTD_outBuffer output{in.to.data(), in.to.size(), 0};
-            in.left = ZSTD_decompressStream(in.context.get(), &output, &in.there);
-            if (ZSTD_isError(in.left) != 0)
-                throw std::runtime_error(path_ + ": " + ZSTD_getErrorName(in.left));
+            const std::size_t left = ZSTD_decompressStream(in.context.get(), &output, &in.there);
+            if (ZSTD_isError(left) != 0)
+                throw std::runtime_error(path_ + ": " + ZSTD_getErrorName(left));
             piece = {in.to.data(), output.pos};
             if (output.pos > 0) return true;
         }
         const std::size_t n = std::fread(in.from.data(), 1, in.from.size(), in.file.get());
         if (std::ferror(in.file.get()) != 0)
             throw std::runtime_error(path_ + ": " + std::strerror(errno));
-        if (n == 0 && in.packed && in.left != 0)
-            throw std::runtime_error(path_ +
-                                     ": found the end of the file, expected more of its frame");
         if (n == 0) return false;
         in.there = {in.from.data(), n, 0};
         piece = {in.from.data(), n};

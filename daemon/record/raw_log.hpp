@@ -81,7 +81,8 @@ class RawLog {
 /// True: a compressed file is empty or ends within a frame of zstd. Only the sizes in it are read.
 [[nodiscard]] bool is_cut(const std::string& path);
 
-/// A file of a raw log piece by piece, decompressed if it ends in .zst. Throws std::runtime_error.
+/// A file of a raw log piece by piece, decompressed if it ends in .zst. One that is_cut() is read
+/// up to there; who reads it has to say so. Throws std::runtime_error.
 class RawReader {
   public:
     explicit RawReader(std::string path);

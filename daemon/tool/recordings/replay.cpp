@@ -170,6 +170,12 @@ bool is_whole(const std::vector<std::string>& files, const std::string& campaign
         const std::string folder = record::folder_of(files.front());
         whole = tell_missing_raw(folder);
         whole = tell_left_out(folder, files) && whole;
+    } else {
+        for (const auto& path : files) {
+            if (!path.ends_with(".zst") || !record::is_cut(path)) continue;
+            std::cerr << path << ": its end is missing: the file is cut off\n";
+            whole = false;
+        }
     }
     return whole;
 }

@@ -1,17 +1,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/record/candump_campaign.hpp"
 #include "daemon/record/dwells_csv.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/index.hpp"
+#include "daemon/record/raw_frames.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/record/replay.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -197,6 +201,52 @@ TEST_F(RawSegments, ThatAreCutOffAreNamed) {
             << size;
     }
     EXPECT_EQ(recover(folder_.string(), [](const auto&) {}).at(0).missing_raw.size(), 1U);
+}
+
+TEST_F(RawSegments, ThatAreCutOffAreReadUpToThere) {
+    // GIVEN a log of more than one block of zstd
+    std::mt19937 random(1);
+    std::ofstream more(segment(2), std::ios::app);
+    for (int i = 0; i < 40'000; ++i)
+        more << "(1700000179.500000) vcan0 7FF#" << 10'000'000 + random() % 80'000'000 << " R\n";
+    more.close();
+    const auto text_of = [](const std::string& path) {
+        std::string text;
+        read_raw(path, [&](std::string_view piece) {
+            text += piece;
+            return true;
+        });
+        return text;
+    };
+    const std::string whole = text_of(segment(2));
+    ASSERT_EQ(compress(segment(2)), "");
+    const std::string packed = segment(2) + ".zst";
+    ASSERT_EQ(text_of(packed), whole);
+    // WHEN it is cut THEN what comes is what was there before, no less than a block below the cut
+    const auto size = fs::file_size(packed);
+    constexpr std::size_t kBlock = 128 * 1024;  // the most that zstd has in one
+    for (const double part : {0.99, 0.5}) {
+        fs::resize_file(packed, static_cast<std::uintmax_t>(static_cast<double>(size) * part));
+        const std::string there = text_of(packed);
+        EXPECT_TRUE(whole.starts_with(there));
+        EXPECT_GT(there.size() + 3 * kBlock,
+                  static_cast<std::size_t>(static_cast<double>(whole.size()) * part));
+        EXPECT_TRUE(is_cut(packed));
+        // the frames too, and those of the next log behind them
+        RawFrames frames({packed, segment(3)}, 0);
+        std::size_t count = 0, last = 0;
+        while (const RawFrame* frame = frames.next()) {
+            ++count;
+            last = frame->log;
+        }
+        EXPECT_EQ(count, static_cast<std::size_t>(std::ranges::count(there, '\n')) + 60);
+        EXPECT_EQ(last, 1U);
+    }
+    // WHEN nothing of it is left, or next to nothing
+    for (const std::uintmax_t left : {std::uintmax_t{3}, std::uintmax_t{0}}) {
+        fs::resize_file(packed, left);
+        EXPECT_EQ(text_of(packed), "");
+    }
 }
 
 TEST_F(RawSegments, ThatLieThereAreLeftOutAndNotMissing) {
