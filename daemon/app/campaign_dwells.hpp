@@ -108,8 +108,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] estimator::spectrum::Shaken shaken() const;
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
     void take_verdict(campaign::Campaign& campaign);
-    void tell_verdict(const estimator::uncertainty::Assessment& assessed,
-                      campaign::Campaign& campaign);
+    void tell_verdict(const Judged& judged, campaign::Campaign& campaign);
     void write_result(const Judged& judged, campaign::Campaign& campaign);
     [[nodiscard]] std::string marked(std::string mark);
     void take_anew(const Judged& judged, campaign::Campaign& campaign);

@@ -27,6 +27,7 @@ constexpr std::size_t kEveryDwell = 60, kAmongMany = 10;
 std::pair<int, int> dwell_named(const uncertainty::Assessment& assessed,
                                 const estimator::Result& result) {
     for (const auto& reason : assessed.verdict.reasons) {
+        if (reason.code == "configuration") return {};  // measured again it contradicts again
         if (reason.dwell < 1) continue;
         const auto at = static_cast<std::size_t>(reason.dwell) - 1;
         // That of the filter counts all dwells, a pattern those that are kept.
@@ -95,21 +96,19 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     if (verdict_wanted()) {
         // In a thread of its own also where one may wait: what it has of memory, more with each
         // dwell, is in nobody's way.
-        const auto work = [settings = configuration_.estimator, result = whole_result(),
-                           rows = with_.book.identification().rows(),
-                           means = concluding_ ? with_.book.identification().means()
-                                               : std::vector<estimator::DwellMeans>(),
-                           shaken = concluding_ ? this->shaken() : estimator::spectrum::Shaken{},
-                           anew = concluding_ ? again() : std::nullopt,
-                           stage = concluding_ ? uncertainty::Stage::ended
-                                               : uncertainty::Stage::under_way,
-                           trim = !with_.memory_locked] {
-            auto found = std::make_shared<const Judged>(
-                judge(settings, result, anew, stage, rows, means, shaken));
-            // Locked memory is not given back; asking for it would only disturb.
-            if (trim) rt::give_free_memory_back();
-            return found;
-        };
+        const auto work =
+            [settings = configuration_.estimator, result = whole_result(),
+             rows = with_.book.identification().rows(), means = with_.book.identification().means(),
+             shaken = concluding_ ? this->shaken() : estimator::spectrum::Shaken{},
+             anew = concluding_ ? again() : std::nullopt,
+             stage = concluding_ ? uncertainty::Stage::ended : uncertainty::Stage::under_way,
+             trim = !with_.memory_locked] {
+                auto found = std::make_shared<const Judged>(
+                    judge(settings, result, anew, stage, rows, means, shaken));
+                // Locked memory is not given back; asking for it would only disturb.
+                if (trim) rt::give_free_memory_back();
+                return found;
+            };
         // The rig's clock waits for this thread: there a verdict takes no time.
         if (with_.at_once) {
             judged = assessing_.compute(work);
@@ -119,12 +118,12 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     }
     if (!with_.at_once) judged = assessing_.take().value_or(nullptr);
     if (!judged) return;
-    tell_verdict(judged->assessed, campaign);
+    tell_verdict(*judged, campaign);
     if (std::exchange(concluding_, false)) write_result(*judged, campaign);
 }
 
-void CampaignDwells::tell_verdict(const uncertainty::Assessment& assessed,
-                                  campaign::Campaign& campaign) {
+void CampaignDwells::tell_verdict(const Judged& judged, campaign::Campaign& campaign) {
+    const auto& assessed = judged.assessed;
     const bool enough = assessed.done && assessed.degrees >= kFewestDegrees;
     if (!enough && !concluding_) return;
     const auto& verdict = assessed.verdict;
@@ -134,6 +133,8 @@ void CampaignDwells::tell_verdict(const uncertainty::Assessment& assessed,
         const auto said =
             fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence);
         with_.events.log(severity_of(verdict.level), "fit", said);
+        if (!judged.contradictions.empty())
+            with_.events.log(Severity::warning, "fit", judged.contradictions.back());
         if (verdict.level == uncertainty::Level::not_valid) {
             const auto [run, position] = dwell_named(assessed, result_);
             campaign.doubted(said, run, position);

@@ -57,7 +57,7 @@ void ControlLoop::begin_certificate(WaitingCommand waiting) {
         true, fmt::format("certificate {}: entered in {}", issued.number, journal_->status().path)};
     const auto entry = journal_->command(waiting.request, reply, utc_now());
     if (entry == 0) {
-        waiting.reply.set_value({false, "the journal takes no more just now: the disk is slow"});
+        reply_later(waiting, {false, "the journal takes no more just now: the disk is slow"});
         return;
     }
     numbers.push_back(issued.number);
@@ -73,7 +73,7 @@ void ControlLoop::finish_certificates(bool at_once) {
             if (!at_once && rt::steady_now() - one.since_steady < kJournalPatience) return false;
             one.reply = {false, "the journal has not written it yet: the number is used up"};
         }
-        one.waiting.reply.set_value(one.reply);
+        reply_later(one.waiting, std::move(one.reply));
         return true;
     });
 }

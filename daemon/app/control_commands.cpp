@@ -73,7 +73,16 @@ void ControlLoop::answer(WaitingCommand& waiting, const CommandReply& reply) {
     if (started && configuration_.simulated())
         log(Severity::info, "campaign",
             "SIMULATED: the rig is a program, nothing of this is a measurement");
-    waiting.reply.set_value(reply);
+    reply_later(waiting, reply);
+}
+
+void ControlLoop::reply_later(WaitingCommand& waiting, CommandReply reply) {
+    replies_.emplace_back(std::move(waiting.reply), std::move(reply));
+}
+
+void ControlLoop::give_replies() {
+    for (auto& [to, reply] : replies_) to.set_value(std::move(reply));
+    replies_.clear();
 }
 
 std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now) const {

@@ -17,11 +17,11 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     if (word == "attend") {
         if (attendance_ && journal::same_person(request.by, attendance_->by))
             attendance_->steady = rt::steady_now();
-        return waiting.reply.set_value({true, "there"});
+        return reply_later(waiting, {true, "there"});
     }
     if (word == "read") {  // several times a second: no row of the audit
         commissioning_.attend(request.by);
-        return waiting.reply.set_value({true, read_commissioning(what)});
+        return reply_later(waiting, {true, read_commissioning(what)});
     }
     if (word == "accept" || word == "state")
         return answer(waiting, enter_in_record(request, what, now));

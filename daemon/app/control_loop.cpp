@@ -53,6 +53,7 @@ void ControlLoop::run() {
         watch_arming();
         supervisor_.check_balance(now);
         show(now);
+        give_replies();
         done = campaign_.done(now) && dwells_.written();
         if (done) break;
         control_waiter_->wait_until(std::min(next, commissioning));
@@ -61,6 +62,7 @@ void ControlLoop::run() {
     give_up_arming("the daemon is shutting down");
     finish_acknowledging(true);
     finish_certificates(true);
+    give_replies();
     if (done) end_arming("the daemon has ended in order");
     const std::lock_guard lock(mutex_);
     ended_ = done;

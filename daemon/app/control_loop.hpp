@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/app/commissioning.hpp"
@@ -76,6 +77,9 @@ class ControlLoop {
     // Commands, trips and latches (control_commands.cpp).
     void take_commands(drivers::Time now);
     void answer(WaitingCommand& waiting, const CommandReply& reply);
+    /// Once show() has shown what came of it: who is told "accepted" sees it in the status.
+    void reply_later(WaitingCommand& waiting, CommandReply reply);
+    void give_replies();
     /// An arming is accepted once the journal has it on disk; nobody waits for that but who asked.
     void begin_arming(WaitingCommand waiting, drivers::Time now);
     void begin_rest_check(WaitingCommand& waiting, drivers::Time now);
@@ -181,6 +185,7 @@ class ControlLoop {
         std::uint64_t entry = 0;
         drivers::Time since_steady = 0;
     };
+    std::vector<std::pair<std::promise<CommandReply>, CommandReply>> replies_;
     std::vector<Acknowledging> acknowledging_;
     std::vector<Acknowledging> certifying_;       ///< certificates that are not answered yet
     std::uint64_t entry_of_acknowledgement_ = 0;  ///< the newest; 0: none

@@ -44,6 +44,15 @@ std::optional<TakenAnew> take_anew(const estimator::Settings& settings, const Ag
     return TakenAnew{std::move(found), identification.rows(), identification.means()};
 }
 
+/// While it runs, too: a night with a wrong key shows after its first dwells.
+void hold_against_configuration(const estimator::Settings& settings,
+                                const std::vector<estimator::DwellSummary>& dwells,
+                                const std::vector<estimator::DwellMeans>& means, Judged& out) {
+    auto contradiction = estimator::commissioning::contradiction_of(settings, dwells, means);
+    out.contradictions = std::move(contradiction.warnings);
+    uncertainty::contradict(out.assessed.verdict, contradiction.first);
+}
+
 }  // namespace
 
 Judged judge(const estimator::Settings& settings, const estimator::Result& result,
@@ -53,6 +62,7 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
     Judged out;
     if (stage != uncertainty::Stage::ended) {
         out.assessed = uncertainty::assess(settings, result, stage);
+        hold_against_configuration(settings, result.dwells, means, out);
         return out;
     }
     std::optional<TakenAnew> anew;
@@ -63,10 +73,8 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
     out.assessed = std::move(found.assessed);
     out.spectrum = std::move(found.spectrum);
     // With the campaign's own noise, as a replay of the recording has it, whatever noise was found.
-    auto contradiction = estimator::commissioning::contradiction_of(
-        settings, anew ? anew->result.dwells : result.dwells, anew ? anew->means : means);
-    out.contradictions = std::move(contradiction.warnings);
-    uncertainty::contradict(out.assessed.verdict, contradiction.first);
+    hold_against_configuration(settings, anew ? anew->result.dwells : result.dwells,
+                               anew ? anew->means : means, out);
     if (!anew) return out;
     out.live = std::make_shared<const dwells::Live>(
         dwells::Live{again->found, result, uncertainty::assess(settings, result)});

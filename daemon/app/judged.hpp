@@ -29,12 +29,11 @@ struct Judged {
     std::shared_ptr<const dwells::Live> live;           ///< what `anew` replaces
     std::string not_anew;                               ///< why not, though it should be
     std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
-    /// For the result, in the end: how the dwells contradict the configuration.
+    /// How the dwells contradict the configuration, and last what would explain it.
     std::vector<std::string> contradictions = {};
 };
 
-/// Any thread. `all_rows`: with those apart from the result's; `means`: of the result's dwells,
-/// wanted in the end.
+/// Any thread. `all_rows`: with those apart from the result's; `means`: of the result's dwells.
 [[nodiscard]] Judged judge(const estimator::Settings& settings, const estimator::Result& result,
                            const std::optional<Again>& again, estimator::uncertainty::Stage stage,
                            const std::vector<estimator::DwellRow>& all_rows,

@@ -84,11 +84,12 @@ def comes_back(checks, rig, lab):
     run = subprocess.run([lab.program, "archive", "verify", "--config", rig.configuration], capture_output=True, text=True, timeout=60)
     checks.check(run.returncode == 0, "rig and archive have the same", run.stdout + run.stderr)
     rig.daemon.end()
+    before = len(rig.daemon.text())
     rig.start_daemon()
     status = rig.wait_for(lambda s: r.measuring(s) and "archive" in s, 60)
     time.sleep(1)
     checks.equal(number(rig.status(), "delivered"), 0, "after a restart it is not delivered again")
-    page = rig.daemon.text().split("live page: ")[-1].split()[0]   # of the newest start
+    page = rig.page_address(after=before)
     unit, end = {}, time.monotonic() + 30
     while "unit" not in unit and time.monotonic() < end:   # it is asked for when nobody else wants the processor
         time.sleep(0.2)

@@ -80,7 +80,7 @@ def named_and_acknowledged(checks, rig, journal, what, says, within_s):
     rig.start()
     checks.check(journal.latch()[0] != "", f"{what}: SIGKILL does not acknowledge it", str(rig.latches()))
     answer = rig.tool("ack", "journal", "--by", "Grace")
-    armed = rig.tool("arm", "--by", "Ada")
+    armed = rig.arm("Ada")
     checks.check(answer.returncode == 0 and armed.returncode == 0, f"{what}: acknowledged by a named person it arms",
                  answer.stderr + armed.stderr)
     rig.tool("abort", "--by", "Ada")
@@ -112,7 +112,7 @@ def halved(checks, rig, journal):
     says = {"arm": rig.tool("arm", "--by", "Ada").stderr, "selftest": rig.tool("selftest").stdout, "log": rig.logs()}
     checks.equal([place for place, text in says.items() if to_do not in text], [], "halved: what to do is said")
     answer = rig.tool("ack", "journal", "--by", "Grace")
-    armed = rig.tool("arm", "--by", "Ada")
+    armed = rig.arm("Ada")
     checks.check(answer.returncode == 0 and armed.returncode == 0, "halved: acknowledged it arms", answer.stderr + armed.stderr)
     rig.tool("abort", "--by", "Ada")
 
@@ -137,7 +137,7 @@ def killed_at_random(checks, rig, journal, seed):
 
 def recorded(checks, rig, journal):
     """A head of it is kept in the recording: by it a journal that was set back is known."""
-    rig.tool("arm", "--by", "Ada")
+    rig.arm("Ada")
     rig.tool("start", "--by", "Ada")
     rig.wait_for_state(("recording",), 60)
     rig.daemon.end()

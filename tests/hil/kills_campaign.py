@@ -169,7 +169,7 @@ class Kill:
         status = self.rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 30)
         self.how = "resume" if status and status["campaign"].get("resume_offer") and self.rng.random() < 0.7 else "start"
         self.state = "just begun"
-        said = [self.rig.tool(command, "--by", "test") for command in ("arm", self.how)]
+        said = [self.rig.arm("test"), self.rig.tool(self.how, "--by", "test")]
         self.begun = self.going_on = time.monotonic()
         return self.check(all(s.returncode == 0 for s in said), f"{self.how} is accepted",
                           f"{[s.stderr for s in said]}\n{self.rig.logs()}")

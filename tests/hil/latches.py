@@ -62,7 +62,7 @@ class Rig(r.Rig):
 
     def acknowledge(self):
         """By two persons; once the controller has confirmed it, arming works."""
-        return [self.tool("ack", "trip", "--by", by) for by in ("Ada", "Grace")]
+        return [super(Rig, self).acknowledge("trip", by) for by in ("Ada", "Grace")]
 
 
 def killed_at_any_moment(checks, rig, seed):

@@ -73,16 +73,6 @@ def get(address, path, headers=None, method="GET", body=None):
     return answer.status, answer.getheader("Content-Type"), answer.read().decode()
 
 
-def page_address(rig, timeout_s=30):
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        for line in reversed(rig.daemon.text().splitlines()):
-            if "live page: " in line:
-                return line.split("live page: ")[1].strip()
-        time.sleep(0.1)
-    raise RuntimeError("vibrigd names no page:\n" + rig.logs())
-
-
 def free_port():
     """For a program that cannot choose one itself: below those that the kernel gives out meanwhile."""
     while True:
@@ -342,6 +332,7 @@ def check_stop(checks, rig, page, until, remote, pki):
     state = "document.getElementById('state').textContent"
     acknowledge(rig)
     start_campaign(checks, rig, "one more campaign starts")
+    rig.order("speed 5")   # it is stopped before it ends
 
     def come_as(name):
         page.ask("as", origin=remote, certPath=os.path.join(pki, name + ".crt"), keyPath=os.path.join(pki, name + ".key"))
@@ -360,6 +351,7 @@ def check_stop(checks, rig, page, until, remote, pki):
     checks.check("error" not in answer, "it takes a click", str(answer))
     until("and no more: the campaign is aborted", state + " === 'aborted'")
     until("nothing complains", "!/NOT ACCEPTED/.test(document.getElementById('stop-note').textContent)")
+    rig.order("speed 60")
     events = rig.tool("events").stdout
     checks.check("live page (certificate ada, operator, from 127.0.0.1)" in events, "who stopped it is in the events", events[-1500:])
     with contextlib.closing(sqlite3.connect(os.path.join(rig.results, "journal.sqlite3"))) as journal:
@@ -411,8 +403,7 @@ def check_page(checks, rig, page, address, remote, pki):
                  "on plain HTTP nobody can stop the rig")
     checks.check("Not the emergency stop" in page.ask("text", selector="#stop-note").get("value", ""),
                  "the stop says that it is not the emergency stop")
-    checks.check(rig.tool("arm", "--by", "page test").returncode == 0 and rig.tool("start", "--by", "page test").returncode == 0,
-                 "the campaign starts", rig.logs())
+    start_campaign(checks, rig, "the campaign starts")
     until("the page follows the campaign live", state + " === 'recording'", 60)
     until("its progress grows", "document.getElementById('progress').value > 20", 60)
     until("coefficients with sigma are shown", "document.querySelectorAll('#coefficients td small').length >= 10")
@@ -504,7 +495,7 @@ def check_commissioning(checks, programs, folder):
         rig.configure(CAMPAIGN, server={"page": f"127.0.0.1:{free_port()}"})
         rig.start_daemon()
         rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest", 60)
-        address, page = page_address(rig), Page()
+        address, page = rig.page_address(), Page()
         page.ask("open", url=address)
         dialogue = subprocess.Popen([rig.program("vibrig"), "commission", "--by", "Ada", "--socket", rig.socket], stdin=subprocess.PIPE,
                                     stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=r.die_with_parent)
@@ -557,7 +548,7 @@ def main():
                                             "revoked": os.path.join(pki, "revoked.crl")},
                           platform=PLATFORM, accelerometer={"zero_g": ZERO_G})
             rig.start_daemon()
-            address = page_address(rig)
+            address = rig.page_address()
             rig.wait_for(r.measuring, 30)
             check_description(checks, rig, address)
             check_injection(checks, rig, address)

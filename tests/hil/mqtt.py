@@ -161,8 +161,11 @@ def check_data(checks, host, rig, birth):
     checks.check(host.until(lambda: any(m.alias == state and m.string_value == "recording"
                                         for p in host.kind("NDATA")[-20:] for m in p.metrics)),
                  "its state is reported when it changes", rig.logs())
+    rig.order("speed 2")   # so fast that a stop is measured as it is also where the machine is busy
     gone = rig.tool("abort", "--by", "fleet test")
     checks.check(gone.returncode == 0, "it is aborted", gone.stderr)
+    rig.wait_for_state(("aborted", "idle", "tripped"), 30)
+    rig.order("speed 50")
 
 
 def check_commands(checks, host, rig, birth):
@@ -217,7 +220,7 @@ def check_broker_lost(checks, host, rig, broker, again):
     lost = rig.wait_for(lambda s: not s["mqtt"]["connected"], PATIENCE_S)
     checks.check(not lost["mqtt"]["connected"] and lost["mqtt"]["note"], "a lost broker is reported, with the cause", str(lost["mqtt"]))
     checks.check("DOWN" in rig.tool("status").stdout, "and shown by `vibrig status`")
-    metrics = live_page.get(live_page.page_address(rig), "/metrics")[2]
+    metrics = live_page.get(rig.page_address(), "/metrics")[2]
     checks.check("\nvibrig_mqtt_up 0\n" in metrics, "and by the metrics", metrics[-1500:])
     later = rig.wait_for(lambda s: n(s["assembler"]["samples"]) > n(lost["assembler"]["samples"]) + 400, PATIENCE_S)
     checks.check(n(later["assembler"]["samples"]) > n(lost["assembler"]["samples"]) + 400, "measuring goes on")

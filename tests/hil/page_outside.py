@@ -46,7 +46,7 @@ def check_guard(checks, programs, folder, page):
         rig.start_daemon()
         rig.wait_for(guarding.watching, SOON)
         until = watcher(checks, page, rig)
-        page.ask("open", url=live_page.page_address(rig))
+        page.ask("open", url=rig.page_address())
         until("a guard that watches is shown", shown("/^guard watches$/"))
         until("and the horn, which answers", shown("/^horn ready$/"))
         rig.guard.end()
@@ -97,7 +97,7 @@ def check_commissioning(checks, programs, folder, page):
         rig.start_daemon()
         rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("state") == 0, SOON)
         until = watcher(checks, page, rig)
-        page.ask("open", url=live_page.page_address(rig))
+        page.ask("open", url=rig.page_address())
         begun = post(rig, {"do": "begin"})
         checks.check(begun.get("accepted") is True, "commissioning begins", str(begun) + rig.logs())
 

@@ -7,6 +7,7 @@ usage: python_package.py PROGRAMS      PROGRAMS: build/PRESET/bin
 import contextlib
 import hashlib
 import json
+import math
 import os
 import random
 import re
@@ -74,7 +75,7 @@ def look_live(checks, rig, where, client):
 
 
 def check_live(checks, rig, keys, port):
-    page = next(line.split("live page: ")[1].strip() for line in rig.daemon.text().splitlines() if "live page: " in line)
+    page = rig.page_address()
     with vibrig.Client(rig.socket) as client:
         look_live(checks, rig, "socket", client)
     with vibrig.Client(page=page) as client:
@@ -114,6 +115,9 @@ def check_recording(checks, rig, folder):
     checks.check(np.allclose(found.drift_dph, [g["drift_dph"] for g in gyros], rtol=1e-12) and
                  np.allclose(found.residual_dph, [g["residual_sigma_dph"] for g in gyros], rtol=1e-9), "compensation as vibrig's",
                  f"{found} {gyros}")
+    said = np.array([math.nan if p["u"] is None else p["u"] for p in campaign.result["parameters"]])
+    checks.check(np.allclose(campaign.coefficients.u, said, rtol=1e-6, equal_nan=True) and np.isfinite(said).any(), "the uncertainty is the result's",
+                 f"{campaign.coefficients.u} {said}")
     exported = os.path.join(rig.folder, "x.csv")
     tool(rig, "export", folder, "--to", "csv", "-o", exported)
     with open(exported, encoding="utf-8") as file:
@@ -150,7 +154,7 @@ def check_octave(checks, rig, campaign):
 [d, u, ok] = vibrig.compensation(c, [45 10 90], 'table_g', 9);
 printf('%d %d %d %s %s %d\\n', rows(c.samples.force_g), columns(c.samples.force_g), rows(c.dwells.covariance), c.state, ...
        c.units.conditions.temperature_c, numel(c.interlocks));
-printf('%.17g ', d, u, c.coefficients.value, mean(c.samples.force_g), c.conditions.temperature_c(end), all(ok));
+printf('%.17g ', d, u, c.coefficients.value, c.coefficients.u, mean(c.samples.force_g), c.conditions.temperature_c(end), all(ok));
 try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end
 c.result.spectrum.model = 'resonance'; vibrig.compensation(c, [45 10 90]);
 try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', e.message); end"""
@@ -159,7 +163,7 @@ try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', 
     lines = run.stdout.splitlines() + ["", "", "", ""]
     checks.equal(lines[0], f"{campaign.samples.rows} 3 {campaign.dwells.rows} finished degC {len(campaign.interlocks)}",
                  "Octave opens the recording with its reader")
-    expected = [*drift.drift_dph, *drift.residual_dph, *campaign.coefficients.value, *campaign.samples["force_g"].mean(axis=0),
+    expected = [*drift.drift_dph, *drift.residual_dph, *campaign.coefficients.value, *campaign.coefficients.u, *campaign.samples["force_g"].mean(axis=0),
                 campaign.conditions["temperature_c"][-1], 1]
     found = [float(x) for x in lines[1].split()]
     checks.check(len(found) == len(expected) and np.allclose(found, expected, rtol=1e-9), "with the same numbers", run.stdout + run.stderr)
@@ -360,7 +364,7 @@ def check_contradiction(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
         rig.start_plant("--seed", "1", "--truth", rig.truth_file({"accelerometer": {"zero_g": [0.015, 0.0, 0.0]}, **r.QUICK}), "--speed", "max")
-        rig.configure({**CAMPAIGN, "name": "crooked", "table_g": [9.0, 0.0]}, unit={"type": "GP-3", "serial": "0017"})
+        rig.configure({**CAMPAIGN, "name": "crooked", "table_g": [9.0, 0.0], "on_not_valid": "pause"}, unit={"type": "GP-3", "serial": "0017"})
         yesterday = os.path.join(rig.results, "result.json")
         os.makedirs(rig.results, exist_ok=True)
         with open(yesterday, "w", encoding="utf-8") as file:
@@ -372,6 +376,12 @@ def check_contradiction(checks, programs, folder):
             rig.tool(command, "--by", "A. Person")
         checks.equal([name for name in os.listdir(rig.results) if name.startswith("result")], ["result-20260301T080000Z.json"],
                      "a campaign that begins puts aside the result of the one before")
+        paused = rig.wait_for_state(("paused", "finished", "aborted", "tripped"), 120)
+        said = rig.tool("events").stdout
+        checks.check(r.state_of(paused).startswith("paused") and "the configuration does not fit the recording" in r.state_of(paused) and
+                     rig.positions_done() < 20 and "suspects, best first: accelerometer.zero_g: about [0.01" in said,
+                     "a configuration that does not fit is told of while the campaign runs, and it pauses", r.state_of(paused) + said[-3000:])
+        rig.tool("resume", "--by", "A. Person")
         rig.wait_for_state(("finished", "aborted", "tripped"), 120)
         rig.wait_for(lambda s: not s["recorder"].get("recording"), 30)
         with open(yesterday, encoding="utf-8") as file:

@@ -55,7 +55,7 @@ def look(checks, programs, folder):
     try:
         planned = c.plan_of(folder, 1)
         c.start(rig, planned, 40.0, "--speed", "10", server={"page": f"127.0.0.1:{live_page.free_port()}"}, begin=False)
-        address, page = live_page.page_address(rig), live_page.Page()
+        address, page = rig.page_address(), live_page.Page()
         page.ask("open", url=address)
 
         def until(text, script, timeout_s=120):
@@ -71,6 +71,7 @@ def look(checks, programs, folder):
         checks.check(commanded.endswith(" g peak"), "and its peak", commanded)
         checks.equal(hidden, True, "a sine has no PSD")
         until("then a random dwell", f"{recording} && ({ROWS}).kind === 'random' && ({ROWS})['controller reports'] === 'at level' && ({ROWS}).table !== 'not known'")
+        rig.order("speed 1")   # it stays until all was looked at
         under_random(checks, page, rows_of(page))
         shots(checks, page, "random")
         live_page.check_accessible(checks, page, "under random vibration")

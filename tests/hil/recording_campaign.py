@@ -71,6 +71,7 @@ def folders(rig):
 def killed(checks, rig):
     begin(checks, rig)
     rig.wait_for(lambda s: len(s["campaign"].get("dwells", [])) >= 2, 60)
+    rig.order("speed 5")   # it goes on while it is looked at
     path = os.path.join(folders(rig)[-1], "campaign.h5")
     with h5py().File(path, "r", swmr=True) as file:
         rows = file["samples/time_ns"].shape[0]

@@ -163,7 +163,8 @@ def noise_goes_on(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
         rig.start_plant("--seed", "4", "--speed", "60", "--fault", "gyro-noise=8@0")
-        rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 15 * k] for k in range(8)], "dwell_s": 30.0})
+        # A reply of a rig whose time stands still is late in real time.
+        rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 15 * k] for k in range(8)], "dwell_s": 30.0}, shaker={"response_timeout_ms": 20000})
         rig.start_daemon()
         rig.wait_for(r.measuring, 60)
         configured = noise_in_force(rig.status())

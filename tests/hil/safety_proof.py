@@ -149,7 +149,7 @@ def honest(checks, programs, folder):
         p.rig.daemon.end()
         p.rig.start_daemon()
         p.rig.wait_for(ready, 60)
-        checks.equal(p.rig.tool("arm", "--by", "Ada").returncode, 0, "a proof outlives the daemon")
+        checks.equal(p.rig.arm("Ada").returncode, 0, "a proof outlives the daemon")
         checks.check(p.rig.daemon.says("as the loop check of the newest proof measured it"), "with the transmission that it measured",
                      p.rig.logs())
         p.rig.tool("abort", "--by", "Ada")

@@ -20,7 +20,6 @@ import time
 import urllib.parse
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import live_page  # noqa: E402
 import rig as r  # noqa: E402
 
 STREAMS, DEAF, REQUESTS_PER_S, CONNECTS_PER_S = 100, 10, 1000, 2000
@@ -127,7 +126,7 @@ def main():
             punctual = rig.be_punctual()
             rig.configure({"name": "load", "identify": "what-it-can"}, server={"page": "127.0.0.1:0"})
             rig.start_daemon()
-            where = urllib.parse.urlparse(live_page.page_address(rig))
+            where = urllib.parse.urlparse(rig.page_address())
             rig.wait_for(r.measuring, 30)
             control = Control(rig.socket)
             server = Thread(rig.daemon.process, "server")

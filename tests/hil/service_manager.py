@@ -99,8 +99,7 @@ def blocked(checks, rig, manager, stage):
     if rig.status()["campaign"]["state"] == "tripped":
         rig.acknowledge(by="tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
-    for command in ("arm", "start"):
-        done = rig.tool(command, "--by", "tester")
+    for command, done in (("arm", rig.arm()), ("start", rig.tool("start", "--by", "tester"))):
         checks.equal(done.returncode, 0, f"{stage}: {command}")
     status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
     checks.check(status is not None and status["campaign"]["state"] == "recording", f"{stage}: the table shakes",
@@ -152,11 +151,10 @@ def restarts_at_rest(checks, rig, manager):
     if rig.status()["campaign"]["state"] == "tripped":
         rig.acknowledge(by="tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
-    checks.equal(rig.tool("arm", "--by", "tester").returncode, 0, "upgrade: armed")
+    checks.equal(rig.arm().returncode, 0, "upgrade: armed")
     with open(request, "w", encoding="ascii"):
         pass
-    checks.check(rig.wait_for(lambda s: "restart waits for rest: the campaign is armed" in rig.daemon.text(), 10) and
-                 rig.daemon.running(), "upgrade: while it is armed the restart waits, and says for what", rig.logs())
+    checks.check(rig.daemon.says("restart waits for rest: the campaign is armed") and rig.daemon.running(), "upgrade: while it is armed the restart waits, and says for what", rig.logs())
     rig.tool("start", "--by", "tester")
     status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
     checks.equal(status["campaign"]["state"], "recording", "upgrade: the campaign goes on")
@@ -170,7 +168,8 @@ def restarts_at_rest(checks, rig, manager):
     with open(request, "w", encoding="ascii"):
         pass
     start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
-    checks.check(rig.wait_for(r.measuring, 20) is not None and not os.path.exists(request),
+    status = rig.wait_for(r.measuring, 20)
+    checks.check(status is not None and r.measuring(status) and not os.path.exists(request),
                  "upgrade: what was asked of the one before does not restart this one", rig.logs())
     checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "upgrade: it ends cleanly")
 

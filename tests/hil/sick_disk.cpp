@@ -2,7 +2,7 @@
 // calls that write.
 //   SICK_FOLDER   what lies below it is on that disk
 //   SICK_CONTROL  one byte: '-' healthy, 'e' every write fails with EIO, 's' fsync takes
-//   SICK_SECONDS, 't' it takes 1 MB/s of all writers together, as a disk does that nothing caches
+//   SICK_SECONDS, and SICK_BEGAN appears when the first does, 't' it takes 1 MB/s of all writers together, as a disk does that nothing caches
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/types.h>
@@ -43,8 +43,10 @@ bool fails(int file) {
 
 void wait(int file) {
     const char* const seconds = std::getenv("SICK_SECONDS");
-    if (seconds != nullptr && on_the_disk(file) && state() == 's')
-        ::sleep(static_cast<unsigned>(std::atoi(seconds)));
+    if (seconds == nullptr || !on_the_disk(file) || state() != 's') return;
+    if (const char* const began = std::getenv("SICK_BEGAN"))
+        ::close(::open(began, O_WRONLY | O_CREAT | O_CLOEXEC, 0644));
+    ::sleep(static_cast<unsigned>(std::atoi(seconds)));
 }
 
 /// One after the other, as long as so many bytes take.

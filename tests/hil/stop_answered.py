@@ -230,16 +230,19 @@ def sick_disks(checks, rig, folder):
 def armed_while_the_disk_takes_its_time(checks, rig, folder):
     """What comes between an arming that is asked for and its being on disk counts: armed is who is fit then."""
     # The daemon's patience is 2 s.
-    with recording_on(checks, rig, folder, "an arming on a slow disk", SICK_SECONDS="1") as disk:
+    began = os.path.join(folder, "fsync-began")
+    with recording_on(checks, rig, folder, "an arming on a slow disk", SICK_SECONDS="1", SICK_BEGAN=began) as disk:
         if disk is None:
             return
         rig.wait_for(lambda t: t["shaker"].get("rest") == "at rest" and t["journal"].get("verified"), 30)
         disk.set("s")
         with subprocess.Popen([rig.program("vibrig"), "arm", "--by", "Ada", "--socket", rig.socket], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               text=True) as arming:
-            time.sleep(0.2)
-            waits = arming.poll() is None
+            end = time.monotonic() + 20
+            while not os.path.exists(began) and time.monotonic() < end:
+                time.sleep(0.005)
             rig.order("estop open")
+            waits = arming.poll() is None
             said = arming.communicate(timeout=30)[0]
         status = rig.status()
         checks.check(waits and arming.returncode == 1 and "emergency" in said and not status["campaign"].get("armed_by"),

@@ -173,8 +173,10 @@ def resumed(checks, programs, folder):
     try:
         planned = plan_of(folder, SWEPT[:2], standing, 60.0)
         start(rig, planned, 20.0, "--speed", "20")
-        status = rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
-        if not checks.check(status is not None, "killed: in the second sweep", f"{r.state_of(status)}\n{rig.logs()}"):
+        def in_the_second(status):
+            return len(status["campaign"]["dwells"]) >= 1 and status["campaign"]["state"] == "recording"
+        status = rig.wait_for(in_the_second, 120)
+        if not checks.check(status is not None and in_the_second(status), "killed: in the second sweep", f"{r.state_of(status)}\n{rig.logs()}"):
             return
         again.take_up(checks, rig, "killed in a sweep", planned[1])
         last = rig.wait_for_state(ENDS, 240)

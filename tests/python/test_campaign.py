@@ -38,7 +38,8 @@ def test_frames_have_utc_and_a_column_for_each_number(campaign):
 
 def test_coefficients_with_covariance(campaign):
     found = campaign.coefficients
-    assert found["D_Fx"] == vibrig.Coefficient("D_Fx", -1.0, found.sigma[0], "deg/h", True)
+    assert found["D_Fx"] == vibrig.Coefficient("D_Fx", -1.0, found.sigma[0], "deg/h", True, found.u[0])
+    assert np.allclose(found.u[:29], found.sigma[:29]) and np.isnan(found.u[29])   # no result: the filter's covariance
     assert not found["D_OSz"].observable and np.isnan(found["D_OSz"].value)
     assert np.all(np.isnan(found.covariance[29])) and np.all(np.isnan(found.covariance[:, 29]))
     assert np.allclose(np.diag(found.correlation)[:29], 1)

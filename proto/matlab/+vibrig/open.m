@@ -7,8 +7,9 @@ function campaign = open(path)
 %   the file (samples.force_g is n x 3); their times are ns of the first part's clock, UTC is those plus utc_offset_ns:
 %     c.samples, c.orders, c.dwells, c.estimates, c.conditions, c.events, c.gaps
 %     c.units.samples.force_g      unit of a column, where the file has one
-%     c.coefficients               names, unit, value, sigma (30 x 1), covariance (30 x 30), observable; after the last
-%                                  dwell; NaN: not determined
+%     c.coefficients               names, unit, value, u, sigma (30 x 1), covariance (30 x 30), observable; after the last
+%                                  dwell; NaN: not determined; u is the standard uncertainty, by the covariance; sigma the
+%                                  filter's noise alone, over frequency that of the reference frequency's fit
 %     c.verdict                    of the result; [] without one
 %     c.result, c.plan, c.interlocks, c.configuration (text), c.state, c.name
 %
@@ -89,4 +90,5 @@ if isfield(campaign.result, 'covariance_combined') && isnumeric(campaign.result.
   end
 end
 c.value(seen) = value(seen); c.sigma(seen) = sigma(seen); c.covariance(seen, seen) = covariance(seen, seen);
+c.u = sqrt(diag(c.covariance));
 end

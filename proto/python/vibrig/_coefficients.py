@@ -19,13 +19,18 @@ UNITS: tuple[str, ...] = tuple("deg/h" if term == "F" else "deg/h/g" if len(term
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient; `value` and `sigma` (1 standard deviation) in `unit`, NaN if the data do not determine it."""
+    """One coefficient; `value`, `sigma` and `u` in `unit`, NaN if the data do not determine it.
+
+    `u`: its standard uncertainty, by the covariance; `sigma`: the filter's noise alone, over frequency that of the
+    reference frequency's fit, which may be the larger one.
+    """
 
     name: str
     value: float
     sigma: float
     unit: str
     observable: bool
+    u: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -43,8 +48,8 @@ class Drift:
 class Coefficients(Mapping[str, Coefficient]):
     """By name, in the order of `names` (F I O S II OO SS IO IS OS of gyro x, then y, z; IEEE Std 517).
 
-    `value`, `sigma`: (30,), NaN where not observable; `covariance`: (30, 30) in products of `units`, NaN there too;
-    `observable`: (30,) bool.
+    `value`, `sigma` (the filter's noise alone), `u` (standard uncertainty, by the covariance): (30,), NaN where not
+    observable; `covariance`: (30, 30) in products of `units`, NaN there too; `observable`: (30,) bool.
     """
 
     names = NAMES
@@ -60,6 +65,7 @@ class Coefficients(Mapping[str, Coefficient]):
         self.value: Array = np.where(self.observable, value, np.nan)
         self.sigma: Array = np.where(self.observable, sigma, np.nan)
         self.covariance: Array = np.where(both, covariance, np.nan)
+        self.u: Array = np.sqrt(np.diag(self.covariance))
         self._raw = value, covariance
 
     @classmethod
@@ -85,7 +91,8 @@ class Coefficients(Mapping[str, Coefficient]):
         if name not in NAMES:
             raise KeyError(f"{name}: expected one of {', '.join(NAMES)}")
         i = NAMES.index(name)
-        return Coefficient(name, float(self.value[i]), float(self.sigma[i]), UNITS[i], bool(self.observable[i]))
+        return Coefficient(name, float(self.value[i]), float(self.sigma[i]), UNITS[i], bool(self.observable[i]),
+                           float(self.u[i]))
 
     def __iter__(self) -> Iterator[str]:
         return iter(NAMES)
@@ -96,15 +103,14 @@ class Coefficients(Mapping[str, Coefficient]):
     @property
     def correlation(self) -> Array:
         """(30, 30), NaN where not observable."""
-        deviation = np.sqrt(np.diag(self.covariance))
-        correlation: Array = self.covariance / np.outer(deviation, deviation)
+        correlation: Array = self.covariance / np.outer(self.u, self.u)
         return correlation
 
     def frame(self) -> Any:
-        """A pandas.DataFrame by name: value, sigma, unit, observable."""
+        """A pandas.DataFrame by name: value, sigma, u, unit, observable."""
         import pandas
 
-        return pandas.DataFrame({"value": self.value, "sigma": self.sigma, "unit": UNITS,
+        return pandas.DataFrame({"value": self.value, "sigma": self.sigma, "u": self.u, "unit": UNITS,
                                  "observable": self.observable}, index=pandas.Index(NAMES, name="coefficient"))
 
     def drift(self, up: Array, kappa: float, axes: Sequence[Sequence[str]]) -> Drift:

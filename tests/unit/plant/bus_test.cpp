@@ -10,7 +10,7 @@
 #include "tests/plant/seqpacket_hub.hpp"
 #include "tests/plant/truth.hpp"
 #include "tests/unit/plant/bus_client.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::plant {
 namespace {

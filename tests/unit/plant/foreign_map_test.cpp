@@ -12,7 +12,7 @@
 
 #include "tests/plant/modbus_server.hpp"
 #include "tests/unit/plant/replaced.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::plant {
 namespace {

@@ -1,12 +1,11 @@
 #include "tests/plant/recording.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <map>
 #include <sstream>
-
-#include "tests/unit/plant/temporary_folder.hpp"
 
 namespace vibrig::plant {
 namespace {

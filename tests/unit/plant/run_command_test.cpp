@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::plant {
 namespace {

@@ -1,4 +1,5 @@
 #include "proto/candump.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -128,8 +129,7 @@ TEST(Candump, WritesNoFrameThatABusCannotCarry) {
 }
 
 TEST(Candump, IsReadFromAFileWithTheLineInItsErrors) {
-    std::string name = (std::filesystem::temp_directory_path() / "vibrig-log-XXXXXX").string();
-    const std::filesystem::path folder = ::mkdtemp(name.data());
+    const TemporaryFolder folder;
     const std::string path = (folder / "candump.log").string();
     std::ofstream(path) << "(1.000000) can0 123#11\r\n\n(2.000000) can0 124#22\n(3.0) can0 zzz\n";
     CandumpReader reader(path);
@@ -144,7 +144,6 @@ TEST(Candump, IsReadFromAFileWithTheLineInItsErrors) {
     }
     EXPECT_FALSE(reader.next().has_value());
     EXPECT_THROW(CandumpReader(path + ".none"), CandumpError);
-    std::filesystem::remove_all(folder);
 }
 
 }  // namespace

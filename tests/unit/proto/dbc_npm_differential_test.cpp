@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "proto/dbc.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::proto {
 namespace {
@@ -133,14 +134,6 @@ class RandomDatabase {
 
 class NpmDifferential : public testing::Test {
   protected:
-    NpmDifferential() {
-        std::string name = (fs::temp_directory_path() / "vibrig-npm-XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-    }
-    ~NpmDifferential() override { fs::remove_all(folder_); }
-    NpmDifferential(const NpmDifferential&) = delete;
-    NpmDifferential& operator=(const NpmDifferential&) = delete;
-
     void SetUp() override {
         ASSERT_EQ(std::system("node --version >/dev/null 2>&1"), 0)
             << "node is not installed: this test compares with a decoder that runs on it";
@@ -218,7 +211,7 @@ class NpmDifferential : public testing::Test {
 
   private:
     std::string npm_ = from_environment("VIBRIG_NPM_DIR", VIBRIG_NPM_DEFAULT);
-    fs::path folder_;
+    TemporaryFolder folder_;
 };
 
 TEST_F(NpmDifferential, AgreesOnRandomMessages) {

@@ -1,4 +1,5 @@
 #include "proto/dbc.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -164,12 +165,11 @@ TEST(Dbc, ReadsMessagesWithoutSignalsAndSignalsWithoutReceivers) {
 }
 
 TEST(Dbc, IsReadFromAFile) {
-    std::string name = (std::filesystem::temp_directory_path() / "vibrig-dbc-XXXXXX").string();
-    const std::filesystem::path folder = ::mkdtemp(name.data());
+    const TemporaryFolder folder;
     const std::string path = (folder / "full.dbc").string();
     std::ofstream(path) << kFull;
     expect_full(read_dbc(path));
-    std::filesystem::remove_all(folder);
+    std::filesystem::remove(path);
     try {
         (void)read_dbc(path);
         FAIL() << "no error";

@@ -1,4 +1,5 @@
 #include "proto/recording_csv.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -25,14 +26,6 @@ std::vector<RecordingRow> read_recording(const std::string& path) {
 
 class Recording : public testing::Test {
   protected:
-    Recording() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-csv-XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-    }
-    ~Recording() override { std::filesystem::remove_all(folder_); }
-    Recording(const Recording&) = delete;
-    Recording& operator=(const Recording&) = delete;
-
     [[nodiscard]] std::string path() const { return (folder_ / "recording.csv").string(); }
     [[nodiscard]] std::string write(const std::string& text) const {
         std::ofstream(path(), std::ios::binary) << text;
@@ -57,7 +50,7 @@ class Recording : public testing::Test {
     }
 
   private:
-    std::filesystem::path folder_;
+    TemporaryFolder folder_;
 };
 
 TEST_F(Recording, ProfilesOfRandomDwellsByNameOrNumber) {

@@ -9,17 +9,13 @@
 #include <sstream>
 #include <string>
 
+#include "tests/unit/support/temporary_folder.hpp"
+
 namespace vibrig::test {
 
 /// Runs the real program, whose path is the macro VIBRIG, in a folder of its own.
 class VibrigCommand : public ::testing::Test {
   protected:
-    VibrigCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~VibrigCommand() override { std::filesystem::remove_all(folder_); }
-
     [[nodiscard]] std::string content(const std::string& name) const {
         std::ostringstream text;
         text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
@@ -44,7 +40,7 @@ class VibrigCommand : public ::testing::Test {
         EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
     }
 
-    std::filesystem::path folder_;
+    TemporaryFolder folder_;
     std::string out;
     std::string error;
 };

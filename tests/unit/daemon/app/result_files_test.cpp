@@ -1,4 +1,5 @@
 #include "daemon/app/result_files.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -21,12 +22,6 @@ using ::testing::UnorderedElementsAre;
 
 class ResultFilesTest : public ::testing::Test {
   protected:
-    ResultFilesTest() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~ResultFilesTest() override { std::filesystem::remove_all(folder_); }
-
     ResultFiles files() {
         return {folder_.string(), [this](Severity severity, const std::string& text) {
                     if (severity == Severity::alarm) alarms_.push_back(text);
@@ -49,7 +44,7 @@ class ResultFilesTest : public ::testing::Test {
         return found;
     }
 
-    std::filesystem::path folder_;
+    TemporaryFolder folder_;
     std::vector<std::string> alarms_;
 };
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "tests/unit/daemon/configuration/support.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -12,11 +13,6 @@ using ::testing::HasSubstr;
 
 class Files : public ::testing::Test {
   protected:
-    Files() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~Files() override { std::filesystem::remove_all(folder_); }
     std::string complaint_of(const std::filesystem::path& path) {
         try {
             static_cast<void>(load(path.string(), false));
@@ -25,7 +21,7 @@ class Files : public ::testing::Test {
         }
         return "";
     }
-    std::filesystem::path folder_;
+    TemporaryFolder folder_;
 };
 
 TEST_F(Files, AreReadAndNamedAsGiven) {

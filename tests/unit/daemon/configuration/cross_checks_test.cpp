@@ -4,7 +4,7 @@
 
 #include "daemon/configuration/cross_checks.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -102,7 +102,7 @@ TEST(Together, MotionCannotBeCalledRest) {
 }
 
 TEST(Together, AnInterfaceWithADeviceIsHardware) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     std::filesystem::create_directories(folder.file("can0/device"));
     std::filesystem::create_directories(folder.file("vcan0"));
     EXPECT_TRUE(is_hardware("can0", folder.file(".")));

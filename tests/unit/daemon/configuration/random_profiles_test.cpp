@@ -4,7 +4,7 @@
 
 #include "tests/unit/daemon/configuration/spectrum_keys.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 
 /// What a controller reports as played, at the table, in place of what was to be played.
 TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const std::string path = folder.file("plan.json"), psd = folder.file("psd.json");
     std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3},)"
                         << R"({"position":[0,0,0],"profile":"p","level_db":-3}]})";
@@ -72,7 +72,7 @@ TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
 }
 
 TEST(RandomDwells, OfAPlanAreStopsWithChecksumLevelAndBands) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const std::string path = folder.file("plan.json");
     const auto text = [&](const std::string& run, const std::string& profile,
                           const std::string& mode = "mixed") {

@@ -5,7 +5,7 @@
 
 #include "tests/unit/daemon/configuration/spectrum_keys.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -58,7 +58,7 @@ TEST(SpectrumKeys, EachBadProfileIsReportedWithPlaceValueAndWhatWasExpected) {
 }
 
 TEST(SpectrumKeys, AProfilesFileIsHeldToTheSame) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const std::string path = folder.file("profile.json");
     const auto said = [&](const std::string& content) {
         std::ofstream(path) << content;
@@ -94,7 +94,7 @@ TEST(SpectrumKeys, AHardMountHasATransmissionOfOne) {
 }
 
 TEST(SpectrumKeys, AProofCoversTheFrequenciesOfThePlan) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const auto keys_with = [&](const std::vector<double>& hz) {
         const std::string path = folder.file("plan.json");
         std::string runs;

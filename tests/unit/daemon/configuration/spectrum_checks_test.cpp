@@ -4,7 +4,7 @@
 
 #include "tests/unit/daemon/configuration/spectrum_keys.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -40,7 +40,7 @@ TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemo
 TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne) {
     EXPECT_THAT(complaint("vibration.frequency_hz = 60\n", true),
                 AllOf(HasSubstr("found 60 Hz"), HasSubstr("nearest free one is 60.2 Hz")));
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const auto plan_at = [&](const std::string& hz) {
         const std::string path = folder.file("plan.json");
         std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3,"frequency_hz":)" << hz
@@ -63,7 +63,7 @@ TEST(AccelerometerKeys, WhatTheyHardlySeeIsRefused) {
                                 "accelerometers see 0.465"),
                       HasSubstr("half of the power at least")));
     EXPECT_EQ(complaint("accelerometer.bandwidth_hz = 15\n", false), "");
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const auto plan_with = [&](const std::string& run, const std::string& more) {
         const std::string path = folder.file("plan.json");
         std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3},{"position":[0,0,0],)"
@@ -106,7 +106,7 @@ TEST(AccelerometerKeys, WhatTheyHardlySeeIsRefused) {
 }
 
 TEST(SpectrumKeys, APlanWithASweepNeedsRegistersRateAndLimits) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const std::string plan = folder.file("plan.json");
     const auto text = [&](const std::string& sweep, double table_g, const std::string& more) {
         std::ofstream(plan) << R"({"runs":[{"position":[0,0,0],"table_g":6,"frequency_hz":15},)"

@@ -27,6 +27,7 @@
 #include "estimator/identification/result.hpp"
 #include "estimator/spectrum/read_sweep.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::dwells {
 namespace {
@@ -410,8 +411,6 @@ class Live {
 class DwellBookTest : public ::testing::Test {
   protected:
     DwellBookTest() {
-        std::string name = (fs::temp_directory_path() / "vibrig-book.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
         journal::Journal journal(path(), kHash);
         journal.start();
         journal.campaign_begun("night", "Ada");
@@ -427,13 +426,9 @@ class DwellBookTest : public ::testing::Test {
         recording.end({"finished", "", "", "", 1});
         journal.stop();  // nobody has ended the campaign
     }
-    ~DwellBookTest() override {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
     [[nodiscard]] std::string path() const { return (folder_ / "journal.sqlite3").string(); }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
     const std::vector<Measured> measured_ = measured();
     DwellBook live_ = watched_book();
     std::string summaries_;

@@ -1,12 +1,11 @@
 #include "daemon/guard/meeting.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
-
-#include "tests/unit/plant/temporary_folder.hpp"
 
 namespace vibrig::guard {
 namespace {
@@ -48,7 +47,7 @@ proto::DaemonWord word_of(std::uint64_t sequence) {
 }
 
 TEST(Meeting, TakesTheNewestWordAndAnswers) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     Meeting meeting(folder.file("guard.sock"));
     EXPECT_FALSE(meeting.attend(1));
     const Caller caller(folder.file("guard.sock"));
@@ -64,7 +63,7 @@ TEST(Meeting, TakesTheNewestWordAndAnswers) {
 }
 
 TEST(Meeting, WhatIsNoWordIsCountedAndNotHeard) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     Meeting meeting(folder.file("guard.sock"));
     const Caller caller(folder.file("guard.sock"));
     caller.say(std::array<std::uint8_t, 3>{1, 2, 3});
@@ -78,7 +77,7 @@ TEST(Meeting, WhatIsNoWordIsCountedAndNotHeard) {
 }
 
 TEST(Meeting, ANewDaemonTakesThePlaceOfTheOld) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     Meeting meeting(folder.file("guard.sock"));
     const Caller old(folder.file("guard.sock"));
     old.say(proto::encode(word_of(10)));
@@ -93,7 +92,7 @@ TEST(Meeting, ANewDaemonTakesThePlaceOfTheOld) {
 }
 
 TEST(Meeting, TheLastWordIsKeptWhenTheDaemonHasGone) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     Meeting meeting(folder.file("guard.sock"));
     {
         const Caller caller(folder.file("guard.sock"));
@@ -107,7 +106,7 @@ TEST(Meeting, TheLastWordIsKeptWhenTheDaemonHasGone) {
 }
 
 TEST(Meeting, AFloodDoesNotHoldUpTheLoop) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     Meeting meeting(folder.file("guard.sock"));
     const Caller caller(folder.file("guard.sock"));
     for (std::uint64_t i = 1; i <= 100; ++i) caller.say(proto::encode(word_of(i)));
@@ -116,7 +115,7 @@ TEST(Meeting, AFloodDoesNotHoldUpTheLoop) {
 }
 
 TEST(Meeting, APlaceLeftBehindIsTakenOverAndOneInUseIsNot) {
-    const plant::TemporaryFolder folder;
+    const TemporaryFolder folder;
     const auto path = folder.file("guard.sock");
     {
         // GIVEN what a killed guard leaves behind

@@ -1,4 +1,5 @@
 #include "daemon/journal/database.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -22,11 +23,8 @@ class DatabaseTest : public testing::Test {
             "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 2000) "
             "INSERT INTO event SELECT printf('%04000d', i) FROM n");
     }
-    ~DatabaseTest() override {
-        for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(path.string() + end);
-    }
-    const std::filesystem::path path =
-        std::filesystem::temp_directory_path() / ("vibrig-database-" + std::to_string(::getpid()));
+    const TemporaryFolder folder;
+    const std::filesystem::path path = folder / "database";
 };
 
 TEST_F(DatabaseTest, HoldsLittleOfAFileHoweverMuchIsReadOfIt) {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "tests/unit/daemon/configuration/support.hpp"
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 // The order of a plan's dwells: sines of several frequencies, random vibration, rest, held out.
 namespace vibrig {
@@ -61,7 +61,7 @@ psd = [[20, 0.02], [120, 0.02]]
             .configuration.campaign.stops;
     }
 
-    plant::TemporaryFolder folder_;
+    TemporaryFolder folder_;
 };
 
 using Key = std::tuple<std::array<double, 3>, double, double, bool>;

@@ -14,6 +14,7 @@
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "drivers/sample/channels.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::record {
 namespace {
@@ -30,15 +31,7 @@ constexpr std::size_t kSamples = 5;
 /// A file whose qualities another build wrote, or which lies about them.
 class CampaignFile : public ::testing::Test {
   protected:
-    CampaignFile() {
-        std::string name = (fs::temp_directory_path() / "vibrig-campaign-file.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-        path_ = (folder_ / "campaign.h5").string();
-    }
-    ~CampaignFile() override {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
+    CampaignFile() { path_ = (folder_ / "campaign.h5").string(); }
 
     /// Samples whose channels all have another quality, channel c that of number c % 5.
     void write(std::size_t samples = kSamples) const {
@@ -77,7 +70,7 @@ class CampaignFile : public ::testing::Test {
         return {};
     }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
     std::string path_;
 };
 

@@ -16,6 +16,7 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace {
 
@@ -136,16 +137,8 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder,
 
 class TornFile : public ::testing::TestWithParam<std::pair<End, int>> {
   protected:
-    TornFile() {
-        std::string name = (fs::temp_directory_path() / "vibrig-torn.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-    }
-    ~TornFile() override {
-        disk = {};
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
-    fs::path folder_;
+    ~TornFile() override { disk = {}; }
+    TemporaryFolder folder_;
 };
 
 TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {

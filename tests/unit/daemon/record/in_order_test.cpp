@@ -17,6 +17,7 @@
 
 #include "daemon/record/raw_frames.hpp"
 #include "daemon/record/raw_log.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::record {
 namespace {
@@ -69,14 +70,6 @@ TEST(InOrder, EndsWithoutBeingAskedForAll) {
 
 class RawLogs : public testing::Test {
   protected:
-    RawLogs() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-raw-XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-    }
-    ~RawLogs() override { std::filesystem::remove_all(folder_); }
-    RawLogs(const RawLogs&) = delete;
-    RawLogs& operator=(const RawLogs&) = delete;
-
     std::string write(const std::string& name, const std::string& text, bool packed) {
         std::string path = folder_ / name;
         std::ofstream(path, std::ios::binary) << text;
@@ -85,7 +78,7 @@ class RawLogs : public testing::Test {
         return path + ".zst";
     }
 
-    std::filesystem::path folder_;
+    TemporaryFolder folder_;
 };
 
 /// A frame a millisecond, the time in its data; every third the daemon sent.

@@ -11,6 +11,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "estimator/identification/dwell_row.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::record {
 
@@ -41,16 +42,7 @@ inline estimator::DwellRow row_of(int position) {
 /// Campaigns in recordings/test-1: files with samples, and dwells of 100 samples.
 class Parts : public ::testing::Test {
   protected:
-    Parts() {
-        std::string name = (fs::temp_directory_path() / "vibrig-parts.XXXXXX").string();
-        recordings_ = ::mkdtemp(name.data());
-        folder_ = recordings_ / "test-1";
-        fs::create_directory(folder_);
-    }
-    ~Parts() override {
-        std::error_code ignored;
-        fs::remove_all(recordings_, ignored);
-    }
+    Parts() { fs::create_directory(folder_); }
 
     static Head head(int part, bool restart = false, std::size_t before = 0) {
         Head head;
@@ -108,7 +100,8 @@ class Parts : public ::testing::Test {
         return {};
     }
 
-    fs::path recordings_, folder_;
+    TemporaryFolder recordings_;
+    const fs::path folder_ = recordings_ / "test-1";
     std::string result_ = "{}";
 };
 

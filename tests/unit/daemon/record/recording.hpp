@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/record/campaign_writer.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::record {
 
@@ -24,15 +25,6 @@ inline constexpr Time kPeriod = 25 * drivers::kMillisecond;
 /// In a folder of its own.
 class Recording : public ::testing::Test {
   protected:
-    Recording() {
-        std::string name = (fs::temp_directory_path() / "vibrig-record.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-    }
-    ~Recording() override {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
-
     static Head head() {
         Head head;
         head.name = "test";
@@ -71,7 +63,7 @@ class Recording : public ::testing::Test {
         return {std::istreambuf_iterator<char>(in), {}};
     }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
 };
 
 inline FrameRecord frame(std::uint32_t id, Time time, bool sent = false) {

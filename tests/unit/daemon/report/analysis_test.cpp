@@ -19,6 +19,7 @@
 #include "daemon/report/report.hpp"
 #include "tests/plant/platform_model.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::report {
 namespace {
@@ -70,17 +71,11 @@ std::vector<std::string> row_of(const std::string& page, const std::string& firs
 class ReportAtARate : public ::testing::TestWithParam<double> {
   protected:
     ReportAtARate() {
-        std::string name = (fs::temp_directory_path() / "vibrig-report.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
         truth_.seed = 7;
         truth_.sample_rate_hz = GetParam();
         plan_.table_g = {kTable_g[0], kTable_g[1]};
         plan_.dwell_s = kDwell_s;
         record();
-    }
-    ~ReportAtARate() override {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
     }
 
     void record() const {
@@ -256,7 +251,7 @@ class ReportAtARate : public ::testing::TestWithParam<double> {
         }
     }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
     plant::Truth truth_;
     plant::CampaignPlan plan_;
 

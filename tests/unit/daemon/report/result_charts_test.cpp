@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "daemon/plot/chart.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::report {
 namespace {
@@ -28,8 +29,6 @@ TEST(Legend, ANameThatWouldNotFitIsDrawnIn) {
 class PlotOfAResult : public ::testing::Test {
   protected:
     PlotOfAResult() {
-        folder_ = fs::temp_directory_path() / ("plot." + std::to_string(::getpid()));
-        fs::create_directories(folder_);
         result_.observable.fill(true);
         result_.sigma.fill(0.01);
         for (std::size_t i = 0; i < estimator::kParameters; ++i) result_.covariance[i][i] = 1;
@@ -38,13 +37,12 @@ class PlotOfAResult : public ::testing::Test {
         for (auto& c : assessed_.coefficients) c.u = 0.02;
         assessed_.rates.resize(3);
     }
-    ~PlotOfAResult() override { fs::remove_all(folder_); }
     static std::string text_of(const fs::path& path) {
         std::ostringstream text;
         text << std::ifstream(path).rdbuf();
         return text.str();
     }
-    fs::path folder_;
+    TemporaryFolder folder_;
     estimator::Result result_;
     estimator::uncertainty::Assessment assessed_;
 };

@@ -7,6 +7,7 @@
 #include "daemon/serve/status_server.hpp"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 #include "tests/unit/daemon/serve/raw_connection.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::serve {
 namespace {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/unit/daemon/serve/raw_connection.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::serve {
 namespace {

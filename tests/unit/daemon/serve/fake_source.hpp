@@ -34,10 +34,12 @@ class FakeSource : public StatusSource {
     FakeSource() : status_(full_status()) {}
 
     [[nodiscard]] StatusData status() const override {
-        ++asked;
+        std::unique_lock lock(mutex_);
+        StatusData status = status_;
+        lock.unlock();
+        ++asked;  // behind it: what is set then is not what was given here
         if (broken) throw std::runtime_error("no status today");
-        const std::lock_guard lock(mutex_);
-        return status_;
+        return status;
     }
     [[nodiscard]] std::vector<EventRecord> events(std::uint64_t after_id,
                                                   std::size_t at_most) const override {

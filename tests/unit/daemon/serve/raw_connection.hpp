@@ -6,19 +6,6 @@
 
 namespace vibrig::serve {
 
-/// A folder of its own under the system's temporary one, removed at the end.
-class TemporaryFolder {
-  public:
-    TemporaryFolder();
-    ~TemporaryFolder();
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    [[nodiscard]] std::string file(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
-
 /// A Unix stream socket that sends whatever bytes a test wants. Reads give up after 20 s.
 class RawConnection {
   public:

@@ -16,6 +16,7 @@
 #include "tests/unit/daemon/serve/fake_source.hpp"
 #include "tests/unit/daemon/serve/raw_connection.hpp"
 #include "tests/unit/daemon/serve/slow_way.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 // Who may do what, through which door, and who is not let in at all.
 namespace vibrig::serve {
@@ -336,10 +337,10 @@ TEST_F(Access, AConnectionLivesNoLongerThanItsCertificate) {
     server->answer();
     const auto ends_soon = [&](const char* name) {
         return make_identity(
-            {Use::client, name, "operator", {}, hours(-1), hours(1) + std::chrono::seconds(4)},
+            {Use::client, name, "operator", {}, hours(-1), hours(1) + std::chrono::seconds(12)},
             &authority);
     };
-    // GIVEN one who streams and one who asks, with certificates that end in 4 s
+    // GIVEN one who streams and one who asks, with certificates that end in 12 s
     const Address eve = remote("eve", ends_soon("eve"));
     Client of_ada(remote("ada", ends_soon("ada")));
     EXPECT_EQ(of_ada.get("/healthz").status, 200);
@@ -355,7 +356,7 @@ TEST_F(Access, AConnectionLivesNoLongerThanItsCertificate) {
             if (certificate.whose.find(who) != std::string::npos) return true;
         return false;
     };
-    for (int i = 0; i < 300 && !(listed("ada") && listed("eve")); ++i)
+    for (int i = 0; i < 1500 && !(listed("ada") && listed("eve")); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     EXPECT_TRUE(listed("ada") && listed("eve"));
     streaming.join();

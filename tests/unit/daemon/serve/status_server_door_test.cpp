@@ -11,6 +11,7 @@
 #include "daemon/serve/status_server.hpp"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 #include "tests/unit/daemon/serve/raw_connection.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 // Doors that somebody takes away, and a stop that somebody else's command must not hold up.
 namespace vibrig::serve {
@@ -93,9 +94,10 @@ TEST_F(Door, IsMadeAnewWhereSomethingElseLies) {
 }
 
 TEST_F(Door, LeavesTheLivingAloneAndComesBackAfterThem) {
-    std::filesystem::remove(settings.socket);
     {
-        const SocketFile other(settings.socket);
+        const SocketFile other(folder.file("other"));
+        // Over it: between a removal and another's bind the door would be made anew.
+        std::filesystem::rename(folder.file("other"), settings.socket);
         EXPECT_TRUE(soon([&] { return times_logged("another vibrigd answers") == 1; }));
         std::this_thread::sleep_for(1200ms);
         EXPECT_EQ(times_logged("another vibrigd answers"), 1u) << "it is logged once";

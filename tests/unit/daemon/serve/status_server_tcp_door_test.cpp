@@ -12,6 +12,7 @@
 #include "daemon/serve/status_server.hpp"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 #include "tests/unit/daemon/serve/raw_connection.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 // Doors in TCP whose listening socket is taken away, as `ss --kill` does.
 namespace vibrig::serve {

@@ -19,6 +19,7 @@
 #include "daemon/study/run.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::study {
 namespace {
@@ -47,15 +48,7 @@ platform.slew_deg_per_s = 90
 
 class StudyRun : public ::testing::Test {
   protected:
-    StudyRun() {
-        std::string name = (fs::temp_directory_path() / "vibrig-study.XXXXXX").string();
-        top_ = ::mkdtemp(name.data());
-        std::ofstream(top_ / "S.toml") << kShort;
-    }
-    ~StudyRun() override {
-        std::error_code ignored;
-        fs::remove_all(top_, ignored);
-    }
+    StudyRun() { std::ofstream(top_ / "S.toml") << kShort; }
     Folder planned(const std::string& name) {
         return plan_study((top_ / "S.toml").string(), (top_ / name).string(), "baseline");
     }
@@ -67,7 +60,7 @@ class StudyRun : public ::testing::Test {
         return reduction.result(0).dump();
     }
 
-    fs::path top_;
+    TemporaryFolder top_;
 };
 
 TEST_F(StudyRun, GivesTheSameForAnyThreadsAndShards) {

@@ -13,6 +13,7 @@
 
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/status.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::study {
 namespace {
@@ -33,8 +34,7 @@ double most_memory_mb() {
 
 /// `tasks` made-up records in 100 parts: what status and merge take.
 void expect_cheap(std::uint64_t tasks) {
-    std::string name = (fs::temp_directory_path() / "vibrig-study.XXXXXX").string();
-    const fs::path top = ::mkdtemp(name.data());
+    const TemporaryFolder top;
     std::ofstream(top / "S.toml") << "[study]\nname = 'a'\nkind = 'campaigns'\nruns = " << tasks
                                   << "\n";
     const Folder folder = plan_study((top / "S.toml").string(), (top / "s").string(), "baseline");
@@ -65,7 +65,6 @@ void expect_cheap(std::uint64_t tasks) {
     const auto result = reduction.result(merged.found().missing_count);
     const double merge_s = processor_s() - begin;
     const double growth_mb = most_memory_mb() - memory_before;
-    fs::remove_all(top);
     std::cout << tasks << " records: status " << status_s << " s, merge " << merge_s
               << " s, memory grows by " << growth_mb << " MB\n";
     EXPECT_EQ(result["done"], tasks);

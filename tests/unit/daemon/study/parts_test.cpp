@@ -16,6 +16,7 @@
 #include "daemon/study/merge.hpp"
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/status.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::study {
 namespace {
@@ -28,15 +29,7 @@ using ::testing::IsEmpty;
 /// A study of 40 tasks whose results are made up: what is tested is how they are kept.
 class StudyParts : public ::testing::Test {
   protected:
-    StudyParts() {
-        std::string name = (fs::temp_directory_path() / "vibrig-study.XXXXXX").string();
-        top_ = ::mkdtemp(name.data());
-        plan("s", 1);
-    }
-    ~StudyParts() override {
-        std::error_code ignored;
-        fs::remove_all(top_, ignored);
-    }
+    StudyParts() { plan("s", 1); }
 
     void plan(const std::string& name, int seed) {
         std::ofstream(top_ / "S.toml")
@@ -88,7 +81,7 @@ class StudyParts : public ::testing::Test {
         return text.str();
     }
 
-    fs::path top_;
+    TemporaryFolder top_;
     Folder folder_;
 };
 

@@ -13,6 +13,7 @@
 #include "daemon/study/run.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::study {
 namespace {
@@ -29,15 +30,6 @@ constexpr std::int64_t kFirst_utc_ns = 20'454 * kDay_ns;  // 2026-01-01
 /// Recordings of the simulated rig below lab/, at 9 and 7 g.
 class StudyRecordings : public ::testing::Test {
   protected:
-    StudyRecordings() {
-        std::string name = (fs::temp_directory_path() / "vibrig-study.XXXXXX").string();
-        top_ = ::mkdtemp(name.data());
-    }
-    ~StudyRecordings() override {
-        std::error_code ignored;
-        fs::remove_all(top_, ignored);
-    }
-
     /// The day counts from 2026-01-01.
     void record(const std::string& name, const std::string& serial, int day,
                 const std::string& result = "{}") {
@@ -125,7 +117,7 @@ class StudyRecordings : public ::testing::Test {
         return "none";
     }
 
-    fs::path top_;
+    TemporaryFolder top_;
 };
 
 TEST_F(StudyRecordings, AreComparedWithWhatTheySaidThenThoseThatDifferMostFirst) {

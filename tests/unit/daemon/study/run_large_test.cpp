@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "daemon/study/reduce.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::study {
 namespace {
@@ -41,8 +42,7 @@ double peak_mb() {
 
 /// Megabytes that a run of so many tasks adds to what this process has.
 double growth_of_run(std::uint64_t tasks) {
-    std::string name = (fs::temp_directory_path() / "vibrig-study.XXXXXX").string();
-    const fs::path top = ::mkdtemp(name.data());
+    const TemporaryFolder top;
     std::ofstream(top / "S.toml") << "[study]\nname = 'a'\nkind = 'campaigns'\nruns = " << tasks
                                   << "\n";
     const Folder folder = plan_study((top / "S.toml").string(), (top / "s").string(), "baseline");
@@ -55,7 +55,6 @@ double growth_of_run(std::uint64_t tasks) {
     peak_mb();
     const double before = peak_mb();
     EXPECT_TRUE(run_study(folder, options).complete());
-    fs::remove_all(top);
     return peak_mb() - before;
 }
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/unit/plant/temporary_folder.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::drivers::test {
 
@@ -38,7 +38,7 @@ class Script {
     }
 
   private:
-    plant::TemporaryFolder folder_;
+    TemporaryFolder folder_;
 };
 
 /// Generous: the machine may be busy.

@@ -101,13 +101,13 @@ TEST(ShakerIdentity, AStopDoesNotWaitForIt) {
         return r.function == kWho ? Answer{Answer::Kind::swallow} : Answer{};
     });
     auto settings = asking(server);
-    settings.identify = 2 * kSecond;
+    settings.identify = 8 * kSecond;
     Bench bench(settings);
     ASSERT_TRUE(server.saw([](const Request& r) { return r.function == kWho; }));
     const auto from = std::chrono::steady_clock::now();
     bench.shaker->stop_now();
     ASSERT_TRUE(server.saw([](const Request& r) { return r.writes_run(); }));
-    EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::milliseconds(500));
+    EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(4));
 }
 
 }  // namespace

@@ -19,6 +19,15 @@ long writes(const TestServer& server) {
     });
 }
 
+/// Two readings on, what was under way before is over: there is one request at a time.
+bool two_readings_on(Bench& bench) {
+    for (int i = 0; i < 2; ++i) {
+        const auto then = bench.shaker->reading().time;
+        if (!bench.eventually([&] { return bench.shaker->reading().time > then; })) return false;
+    }
+    return true;
+}
+
 /// 25 feeds would have been due.
 void half_a_second() { std::this_thread::sleep_for(std::chrono::milliseconds(500)); }
 
@@ -27,13 +36,15 @@ TEST(ShakerReadOnly, NothingIsWrittenAndAllIsRead) {
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().feeds > 2; }));
     bench.shaker->read_only(true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // one may be under way
+    ASSERT_TRUE(two_readings_on(bench));
     const auto before = writes(server);
     const auto then = bench.shaker->reading().time;
     half_a_second();
     EXPECT_EQ(writes(server), before);
-    EXPECT_GT(bench.shaker->reading().time, then);
-    EXPECT_TRUE(bench.shaker->reading().valid);
+    EXPECT_TRUE(bench.eventually([&] {
+        const auto reading = bench.shaker->reading();
+        return reading.valid && reading.time > then;
+    }));
     EXPECT_FALSE(bench.request({15.0, 1.0, 1.0})) << "and nothing is shaken";
     bench.shaker->read_only(false);
     EXPECT_TRUE(bench.eventually([&] { return writes(server) > before; }));
@@ -45,7 +56,7 @@ TEST(ShakerReadOnly, ALinkThatIsMadeMeanwhileIsGivenNoTimeout) {
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::running));
     bench.shaker->read_only(true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ASSERT_TRUE(two_readings_on(bench));
     const auto before = writes(server);
     const auto reconnects = bench.shaker->counters().reconnects;
     server.script(
@@ -69,7 +80,7 @@ TEST(ShakerReadOnly, AStopIsWrittenAtOnceAsEver) {
     ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
     EXPECT_EQ(server.holding(kRun), 0);
     // Afterwards it is read only again.
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ASSERT_TRUE(two_readings_on(bench));
     const auto before = writes(server);
     half_a_second();
     EXPECT_EQ(writes(server), before);

@@ -14,6 +14,8 @@
 #include <set>
 #include <sstream>
 
+#include "tests/unit/support/temporary_folder.hpp"
+
 namespace {
 
 using Json = nlohmann::json;
@@ -36,12 +38,6 @@ struct Outcome {
 /// Runs the real programs in a folder of their own.
 class Identify : public ::testing::Test {
   protected:
-    Identify() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~Identify() override { std::filesystem::remove_all(folder_); }
-
     Outcome run(const std::string& program, const std::string& arguments) {
         // Redirections first, so that those among the arguments win.
         const std::string command = "cd '" + folder_.string() + "' && '" + program +
@@ -59,7 +55,7 @@ class Identify : public ::testing::Test {
         std::ofstream(folder_ / name, std::ios::binary) << text;
     }
 
-    std::filesystem::path folder_;
+    vibrig::TemporaryFolder folder_;
 };
 
 const std::string kHeader = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";

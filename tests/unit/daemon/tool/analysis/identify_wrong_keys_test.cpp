@@ -7,7 +7,10 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
+
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace {
 
@@ -23,25 +26,24 @@ struct WrongKey {
 class WrongKeys : public ::testing::TestWithParam<WrongKey> {
   protected:
     static void SetUpTestSuite() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
+        folder_.emplace();
         ASSERT_EQ(run(std::string(VIBRIG_PLANT) + " record --seed 5 --dwell 20 -o rec.csv"), 0);
     }
-    static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+    static void TearDownTestSuite() { folder_.reset(); }
 
     static int run(const std::string& command) {
         const int status =
-            std::system(("cd '" + folder_.string() + "' && " + command + " >out 2>error").c_str());
+            std::system(("cd '" + folder_->string() + "' && " + command + " >out 2>error").c_str());
         return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     }
     static std::string content(const char* name) {
         std::ostringstream text;
-        text << std::ifstream(folder_ / name).rdbuf();
+        text << std::ifstream(*folder_ / name).rdbuf();
         return text.str();
     }
     /// Exit code and all warnings of an identification.
     static std::pair<int, std::string> identify(const std::string& configuration) {
-        std::ofstream(folder_ / "rig.toml") << configuration;
+        std::ofstream(*folder_ / "rig.toml") << configuration;
         const int code = run(std::string(VIBRIG) + " identify rec.csv --config rig.toml --json");
         std::string warnings;
         const auto result = nlohmann::json::parse(content("out"));
@@ -50,7 +52,7 @@ class WrongKeys : public ::testing::TestWithParam<WrongKey> {
         return {code, warnings};
     }
 
-    static inline std::filesystem::path folder_;
+    static inline std::optional<vibrig::TemporaryFolder> folder_;
 };
 
 TEST_P(WrongKeys, AreSuspectedAndTheExitCodeSaysNo) {
@@ -96,7 +98,7 @@ class RightKeys : public WrongKeys {
                 factor + "))} {print}' rec.csv > m.csv && mv rec.csv s.csv && mv m.csv rec.csv; :"),
             0);
         auto found = identify("");
-        std::filesystem::rename(folder_ / "s.csv", folder_ / "rec.csv");
+        std::filesystem::rename(*folder_ / "s.csv", *folder_ / "rec.csv");
         return found;
     }
 };

@@ -11,10 +11,13 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::tool {
 
@@ -30,8 +33,7 @@ struct Ended {
 class Predict : public ::testing::Test {
   protected:
     static void SetUpTestSuite() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder() = mkdtemp(name.data());
+        made().emplace();
         write("truth.json", "{}");
         ASSERT_EQ(plant("--dwell 1 --write-truth truth.json --table-g 6 -o x.csv").exit_code, 0);
         std::ifstream in(folder() / "truth.json");
@@ -55,7 +57,7 @@ class Predict : public ::testing::Test {
         write("held.toml", "[vibration]\nfrequency_hz = 55.0\n");
         write("sine.json", R"({"name": "55 Hz", "sines": [[55, 3]]})");
     }
-    static void TearDownTestSuite() { std::filesystem::remove_all(folder()); }
+    static void TearDownTestSuite() { made().reset(); }
 
     static constexpr const char* kSurvey =
         " --table-g 6,0,6,6,6,6,6,6 --frequency 15,15,25,35,45,65,85,125";
@@ -75,9 +77,10 @@ class Predict : public ::testing::Test {
             order += (i > 0 ? "," : "") + dwells[i * 26 % dwells.size()];
         return order;
     }
-    static std::filesystem::path& folder() {
-        static std::filesystem::path path;
-        return path;
+    static const std::filesystem::path& folder() { return *made(); }
+    static std::optional<vibrig::TemporaryFolder>& made() {
+        static std::optional<vibrig::TemporaryFolder> folder;
+        return folder;
     }
     static std::string content(const char* name) {
         std::ostringstream text;

@@ -12,6 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tests/unit/support/temporary_folder.hpp"
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -24,12 +26,6 @@ struct Answer {
 /// Recordings with sweeps, by the real programs.
 class Swept : public ::testing::Test {
   protected:
-    Swept() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~Swept() override { std::filesystem::remove_all(folder_); }
-
     [[nodiscard]] std::string content(const char* name) const {
         std::ostringstream text;
         text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
@@ -86,7 +82,7 @@ class Swept : public ::testing::Test {
             out << line.substr(0, last + 1) << digits.data() << ",1\n";
         }
     }
-    std::filesystem::path folder_;
+    vibrig::TemporaryFolder folder_;
 };
 
 TEST_F(Swept, TellAResonanceBesideDwellsAtOneFrequency) {
