@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "estimator/filter/encoder_angles.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -122,8 +123,11 @@ std::string gyro_names(const estimator::Settings& settings, std::size_t term) {
     return text;
 }
 
-Forecast forecast(const estimator::Settings& settings, const std::vector<PlannedRun>& runs,
+Forecast forecast(const estimator::Settings& settings, const std::vector<PlannedRun>& planned,
                   double dwell_s, double period_s, const planning::Terms& terms) {
+    std::vector<PlannedRun> runs;  // what is held out tells of no coefficient
+    std::ranges::copy_if(planned, std::back_inserter(runs),
+                         [](const PlannedRun& run) { return !run.verify; });
     planning::Problem problem;
     problem.terms = terms;
     planning::Effort effort;

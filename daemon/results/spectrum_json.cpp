@@ -13,6 +13,7 @@
 #include "estimator/filter/mapped.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -448,6 +449,18 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
         refuse(place + "refusal", shown(refusal), "a text or null");
     if (refusal.is_string()) model.refusal = refusal.get<std::string>();
     return model;
+}
+
+ResultVerdict read_verdict(const nlohmann::json& root, const std::string& path) {
+    const auto found = root.find("verdict");
+    if (found == root.end() || found->is_null()) return {};
+    const std::string place = path + ": verdict.";
+    const auto& level = member(*found, "level", place);
+    if (level != 0 && level != 1 && level != 2)
+        refuse(place + "level", shown(level), "0 (valid), 1 (doubtful) or 2 (not valid)");
+    const auto& sentence = member(*found, "sentence", place);
+    if (!sentence.is_string()) refuse(place + "sentence", shown(sentence), "a text");
+    return {level == 1, level == 2, proto::printable(sentence.get<std::string>())};
 }
 
 }  // namespace vibrig::tool

@@ -20,4 +20,12 @@ void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
                                                     const std::string& path);
 
+/// What a result says of itself.
+struct ResultVerdict {
+    bool doubtful = false, not_valid = false;
+    std::string sentence;  ///< "not valid, because ..."
+};
+/// Of one of an older vibrig, which has none: nothing. Throws with file, key and what was expected.
+[[nodiscard]] ResultVerdict read_verdict(const nlohmann::json& root, const std::string& path);
+
 }  // namespace vibrig::tool

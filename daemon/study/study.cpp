@@ -373,8 +373,12 @@ class Reader {
                     "campaign.KEY, identify.SECTION.KEY, or a key of the rig");
             return;
         }
+        std::set<std::string> seen;
         for (const toml::node& value : *values) {
             axis.values.push_back(toml_text(value));
+            if (!seen.insert(axis.values.back()).second)
+                problem(value, "grid.\"" + key + "\"", axis.values.back() + " again",
+                        "each value once: points that are the same have one name");
             if (settings) {
                 if (auto one = setting_of(key, value, value)) axis.settings.push_back(*one);
             } else if (auto one = rig_setting(rig_key, value)) {

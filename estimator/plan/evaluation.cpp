@@ -111,6 +111,12 @@ void find_strongest_correlation(const Matrix& cov, const std::vector<std::size_t
     }
 }
 
+/// Of a term of the model: constant, linear, quadratic.
+int degree_of(std::size_t term) {
+    constexpr std::size_t kFirstQuadratic = 4;
+    return term == 0 ? 0 : term < kFirstQuadratic ? 1 : 2;
+}
+
 }  // namespace
 
 std::vector<std::size_t> active(const Terms& terms) {
@@ -138,9 +144,18 @@ Matrix scaled_rows(const Problem& problem, Vector& scale) {
              static_cast<double>(std::max<Eigen::Index>(1, result.rows())))
                 .cwiseSqrt()
                 .transpose();
-    // A term that is never excited but for rounding stays at zero.
-    const double least = kRankTolerance * scale.maxCoeff();
-    scale = (scale.array() > least).select(scale, scale.maxCoeff());
+    // A term that is never excited but for rounding stays at zero. It is held against the terms of
+    // its own degree: how large those of another are is a matter of the unit.
+    const auto terms = active(problem.terms);
+    const Vector found = scale;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+        double largest = 0;
+        for (std::size_t k = 0; k < terms.size(); ++k)
+            if (degree_of(terms[k]) == degree_of(terms[i]))
+                largest = std::max(largest, found[at(k)]);
+        if (!(found[at(i)] > kRankTolerance * largest))
+            scale[at(i)] = largest > 0 ? largest : found.maxCoeff();
+    }
     result = result * scale.cwiseInverse().asDiagonal();
     return result;
 }

@@ -2,7 +2,8 @@
 // calls that write.
 //   SICK_FOLDER   what lies below it is on that disk
 //   SICK_CONTROL  one byte: '-' healthy, 'e' every write fails with EIO, 's' fsync takes
-//   SICK_SECONDS, and SICK_BEGAN appears when the first does, 't' it takes 1 MB/s of all writers together, as a disk does that nothing caches
+//   SICK_SECONDS, and SICK_BEGAN appears when the first does, 't' it takes 1 MB/s of all writers
+//   together, as a disk does that nothing caches
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/types.h>

@@ -56,5 +56,6 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "vibrig-plant: %s\n", error.what());
         return 2;
     }
-    return exit_code;
+    const int printed = vibrig::proto::print_status(app);
+    return printed != 0 ? printed : exit_code;
 }

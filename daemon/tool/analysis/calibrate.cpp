@@ -186,7 +186,7 @@ std::string table_text(const Study& study) {
     text += printed("\n%zu readings, rank %zu of %zu", study.readings.size(), r.plan.rank,
                     r.plan.coefficients);
     text += r.plan.identifies_all() ? printed(", condition %.4g\n", r.plan.condition) : "\n";
-    if (std::isfinite(r.noise)) text += printed("noise of a reading %.4g, 1 sigma\n", r.noise);
+    if (std::isfinite(r.noise)) text += printed("noise of y %.4g, 1 sigma\n", r.noise);
     if (r.test) {
         const planning::ResidualTest& t = *r.test;
         text += t.error_degrees == 0

@@ -50,13 +50,15 @@ struct Held {
     std::vector<std::array<double, 3>> deg;
 };
 
-/// That shook as the profile has it: its sine, or at random by its name.
-bool under(const Profile& profile, const HeldOut& held) {
-    constexpr double kSame = 0.02;
+/// That shook as the profile has it: its sine at its level, or at random by its name.
+bool under(const Profile& profile, const AtPlatform& vibration, const HeldOut& held) {
+    constexpr double kSame = 0.02, kSamePower = 1.26;  // 1 dB
     const estimator::DwellRow& row = held.row;
     if (!(row.vibration.kappa > 1)) return false;
     if (!profile.psd.empty()) return row.random && held.kind.profile == profile.name;
     if (row.random) return false;
+    const double power = level_moment(row.vibration).trace() / vibration.moment.trace();
+    if (!(power < kSamePower && power > 1 / kSamePower)) return false;
     if (profile.sines.size() == 1 && held.kind.bands.size() <= 1)
         return std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame;
     double all = 0;
@@ -109,14 +111,17 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
     SpectrumRequest request;
     request.held_out = true;
     Identified found = identify_recording(recording, config, request);
-    std::erase_if(found.held_out, [&](const HeldOut& one) { return !under(profile, one); });
+    std::erase_if(found.held_out,
+                  [&](const HeldOut& one) { return !under(profile, vibration, one); });
     refuse_fitted(result, found.held_out, recording);
     if (found.held_out.empty())
         throw std::runtime_error(
             recording + ": found no dwell " +
-            (profile.psd.empty() ? profile.sines.size() > 1 ? "at the profile's frequencies"
-                                                            : "at the profile's frequency"
-                                 : "under the profile '" + profile.name + "'") +
+            (profile.psd.empty()
+                 ? printed("at the profile's frequenc%s and level (%.4g g rms at the platform)",
+                           profile.sines.size() > 1 ? "ies" : "y",
+                           std::sqrt(vibration.moment.trace()))
+                 : "under the profile '" + profile.name + "'") +
             " that can be used, expected one (in a campaign of role \"verify\")");
     Held held;
     const auto count = static_cast<Index>(found.held_out.size());
@@ -211,9 +216,12 @@ std::string predicted_json(const Predicted& of) {
         const Verification& v = *of.verification;
         PredictionJson dwells = PredictionJson::array();
         for (Index k = 0; k < v.z.rows(); ++k)
-            dwells.push_back({{"angles", of.held.deg[static_cast<std::size_t>(k)]},
-                              {"rate", three(of.held.rates, k)},
-                              {"z", three(v.z, k)}});
+            dwells.push_back(
+                {{"angles", of.held.deg[static_cast<std::size_t>(k)]},
+                 {"g_rms", number_or_null(std::sqrt(
+                               of.held.situations[static_cast<std::size_t>(k)].moment.trace()))},
+                 {"rate", three(of.held.rates, k)},
+                 {"z", three(v.z, k)}});
         verification = {
             {"chi_square", v.chi_square}, {"dof", v.degrees},           {"p", v.p},
             {"word", word_of(v)},         {"largest_z", v.largest_z},   {"part", v.part},
@@ -266,25 +274,6 @@ std::string predicted_text(const Predicted& of) {
     return text;
 }
 
-std::string profiles_text() {
-    std::string text;
-    for (const Profile& profile : built_in_profiles()) {
-        text += line("%s: %.2f g rms", profile.name.c_str(), std::sqrt(mean_square(profile)));
-        for (const auto& [hz, density] : profile.psd)
-            text += line("    %6g Hz %10g g^2/Hz", hz, density);
-    }
-    return text + "Examples of the types, not a standard's text.\n";
-}
-
-PredictionJson profiles_json() {
-    PredictionJson list = PredictionJson::array();
-    for (const Profile& profile : built_in_profiles())
-        list.push_back({{"name", profile.name},
-                        {"g_rms", std::sqrt(mean_square(profile))},
-                        {"psd", profile.psd}});
-    return {{"profiles", std::move(list)}};
-}
-
 Predicted predict_for(const PredictOptions& options) {
     if (options.result.empty())
         throw std::runtime_error("found no RESULT.json, expected that of vibrig identify --json");
@@ -299,6 +288,13 @@ Predicted predict_for(const PredictOptions& options) {
                                  "\", expected a campaign that a model fits (or --force)");
     Predicted out;
     out.refusal = model.refusal;
+    const ResultVerdict verdict = read_verdict(result, options.result);
+    if (verdict.not_valid && !options.force)
+        throw std::runtime_error(options.result + ": verdict: found \"" + verdict.sentence +
+                                 "\", expected a result that is valid (or --force)");
+    if (verdict.not_valid)
+        out.refusal += (out.refusal.empty() ? "" : "; ") + ("the result is " + verdict.sentence);
+    if (verdict.doubtful) add_note(out, "the result is " + verdict.sentence);
     const auto rig = configuration::load(options.config, false).configuration;
     const plan::StatedProfile stated = find_profile(options.profile, rig);
     out.profile = stated.profile;

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "daemon/results/text_line.hpp"
 #include "estimator/spectrum/profile_moments.hpp"
 
 namespace vibrig::tool {
@@ -68,6 +69,25 @@ AtPlatform at_platform(const Profile& profile, const std::string& at,
     for (const Eigen::Matrix3d& moment : moments) out.moment += moment;
     if (profile.axes.stated()) out.moments = std::move(moments);
     return out;
+}
+
+std::string profiles_text() {
+    std::string text;
+    for (const Profile& profile : built_in_profiles()) {
+        text += line("%s: %.2f g rms", profile.name.c_str(), std::sqrt(mean_square(profile)));
+        for (const auto& [hz, density] : profile.psd)
+            text += line("    %6g Hz %10g g^2/Hz", hz, density);
+    }
+    return text + "Examples of the types, not a standard's text.\n";
+}
+
+nlohmann::ordered_json profiles_json() {
+    auto list = nlohmann::ordered_json::array();
+    for (const Profile& profile : built_in_profiles())
+        list.push_back({{"name", profile.name},
+                        {"g_rms", std::sqrt(mean_square(profile))},
+                        {"psd", profile.psd}});
+    return {{"profiles", std::move(list)}};
 }
 
 std::array<double, 3> read_attitude(const std::string& text) {

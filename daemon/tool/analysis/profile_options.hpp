@@ -33,6 +33,10 @@ struct AtPlatform {
 /// not say.
 [[nodiscard]] double strongest_g_rms(const nlohmann::json& result);
 
+/// The built-in ones.
+[[nodiscard]] std::string profiles_text();
+[[nodiscard]] nlohmann::ordered_json profiles_json();
+
 /// "ALPHA,BETA,GAMMA" of the gimbals, deg. Throws std::runtime_error.
 [[nodiscard]] std::array<double, 3> read_attitude(const std::string& text);
 

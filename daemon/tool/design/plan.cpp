@@ -247,7 +247,9 @@ void add_plan(CLI::App& app, int& exit_code) {
         "          vibrig plan --about result.json --config rig.toml -o about.json\n"
         "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
-        "asks for\nmore than the shaker's limits, 2 bad usage or input.");
+        "asks for\nmore than the shaker's usual limits, 2 bad usage or input, a level beyond the "
+        "limits "
+        "that --config states\namong it.");
     // A survey takes the positions as they are listed.
     for (const char* other :
          {"--evaluate", "--done", "--targets", "--grid", "--time-costs", "--outer", "--inner",

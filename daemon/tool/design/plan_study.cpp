@@ -177,7 +177,11 @@ class Study {
                 "%.6g g at the platform is %.6g g at the table, %.6g %s peak: more than "
                 "%.6g %s (%s)",
                 level, table, value, unit, limit, unit, key);
-            if (!request_.config.empty()) throw std::runtime_error("levels: found " + message);
+            if (!request_.config.empty())
+                throw std::runtime_error(
+                    "levels: found " + message +
+                    printed(", expected at most %.4g g at the platform: --levels",
+                            std::floor(1e3 * level * limit / value) / 1e3));
             out_.warnings.push_back(message);
             out_.beyond_limits = true;
         };
@@ -272,7 +276,7 @@ class Study {
         if (request_.done.empty()) return {};
         planning::Effort effort(candidates_.visits.size(), 0.0);
         for (const auto& run : plan_in(request_.done)) {
-            if (run.sweep_to_hz > 0) continue;
+            if (run.sweep_to_hz > 0 || run.verify) continue;
             const planning::Point wanted = point({run.position_deg, run.level_g});
             std::size_t at = 0;
             for (; at < candidates_.problem.size(); ++at) {
@@ -408,7 +412,11 @@ class Study {
     void judge_uncertainty() {
         constexpr double kMostStep = 10;
         std::vector<planning::Visit> visits;
-        for (const PlanRun& run : out_.runs) visits.insert(visits.end(), run.count, run.visit);
+        const planning::Effort before = done();
+        for (std::size_t i = 0; i < before.size(); ++i)
+            visits.insert(visits.end(), static_cast<std::size_t>(before[i]), candidates_.visits[i]);
+        for (const PlanRun& run : out_.runs)
+            if (!run.verify) visits.insert(visits.end(), run.count, run.visit);
         if (visits.size() < 2 || terms_ != planning::kAllTerms) return;
         out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period_of(c_));
         if (out_.uncertainty->merit.step > kMostStep)
@@ -425,7 +433,8 @@ class Study {
         std::vector<plan::PlannedRun> planned;
         for (const PlanRun& run : out_.runs) {
             all.points.push_back(point(run.visit));
-            effort.push_back(static_cast<double>(run.count));
+            // What is held out tells of no coefficient.
+            effort.push_back(run.verify ? 0.0 : static_cast<double>(run.count));
             planned.push_back({run.visit.position_deg, run.visit.level_g, run.table_g, run.count,
                                run.frequency_hz, run.verify});
         }

@@ -150,9 +150,12 @@ class SurveyPlan {
     void add_resonances(std::vector<double>& listed) {
         const std::string& path = request_.survey.about;
         if (path.empty()) return;
+        const auto result = proto::read_json(path);
         about_ =
-            spectrum::about_resonances(read_model(proto::read_json(path), path).mixture,
+            spectrum::about_resonances(read_model(result, path).mixture,
                                        {1 / period_of(c_), c_.estimator.level_window_s}, listed);
+        if (const auto verdict = read_verdict(result, path); verdict.not_valid || verdict.doubtful)
+            warnings_.push_back(path + " is " + verdict.sentence);
         for (const double hz : spectrum::frequencies_of(about_)) {
             if (std::ranges::find(listed, hz) == listed.end()) listed.push_back(hz);
         }

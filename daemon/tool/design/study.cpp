@@ -117,6 +117,10 @@ void write_result(const StudyOptions& o, const Json& result) {
     if (!o.output.empty()) proto::write_output(o.output, proto::json_text(result, 1) + "\n");
     if (!o.csv.empty()) proto::write_output(o.csv, studies::result_csv(result));
     if (!o.hdf5.empty()) {
+        if (std::filesystem::exists(o.hdf5) && !std::filesystem::is_regular_file(o.hdf5))
+            throw std::runtime_error(o.hdf5 +
+                                     ": found a device, a pipe or a folder, expected a file: HDF5 "
+                                     "goes back and forth in it");
         proto::OutputFile file(o.hdf5);
         std::filesystem::remove(file.place());  // HDF5 makes it anew
         studies::write_hdf5(result, file.place());

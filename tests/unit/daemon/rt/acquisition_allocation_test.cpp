@@ -142,6 +142,9 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     }
     EXPECT_TRUE(filtered(kSamples - 16));
     const std::uint64_t after = test::watched_allocations();
+    // Before the dwell ends: a busy machine sends no sine of equal steps, and the dwell may be
+    // rejected as a whole then.
+    const std::uint64_t used = stage.view().estimate.used;
     acquisition.stop();
     acquisition_thread.join();
     stage.stop();
@@ -150,7 +153,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     ::close(listener);
     // THEN the samples went through the filter and neither thread allocated
     EXPECT_GT(stage.view().in_dwell, kSamples * 9 / 10);
-    EXPECT_GT(stage.view().estimate.used, kSamples / 2);
+    EXPECT_GT(used, kSamples / 2);
     EXPECT_EQ(after - before, 0U);
     // and so did the frames and samples for the recorder and the pieces for the stages
     EXPECT_GT(recorder_frames.counts().pushed + recorder_frames.counts().dropped, 6 * kSamples);

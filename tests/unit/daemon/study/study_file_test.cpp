@@ -83,8 +83,8 @@ TEST(StudyFile, ThatIsWrongIsNamedByPlaceValueAndWhatWasExpected) {
     EXPECT_THAT(
         complaint(kHead + "runs = 1000\n[grid]\n\"campaign.dwell_s\" = " +
                   "[10,11,12,13,14,15,16,17,18,19]\n\"site.azimuth_deg\" = " +
-                  "[0,1,2,3,4,5,6,7,8,9]\n\"site.time_base\" = [" +
-                  std::string("0,0,0,0,0,0,0,0,0,0") + "]\n\"noise.resolver_arcsec\" = [" +
+                  "[0,1,2,3,4,5,6,7,8,9]\n\"drift.bias_walk_deg_h_rt_h\" = " +
+                  "[0,1,2,3,4,5,6,7,8,9]\n\"noise.resolver_arcsec\" = [" +
                   "0,1,2,3,4,5,6,7,8,9]\n\"drift.bias_scatter_deg_h\" = [0,1,2,3,4,5,6,7,8,9]\n"),
         "S.toml:5:1: grid: found 1e+08 tasks, expected at most 1e7: the product of the "
         "lists' lengths and study.runs");
@@ -119,6 +119,9 @@ TEST(StudyFile, ThatIsWrongIsNamedByPlaceValueAndWhatWasExpected) {
                 StartsWith("S.toml:5:10: identify.server.socket: found"));
     EXPECT_THAT(complaint(kHead + "[grid]\n\"campaign.dwell_s\" = 10\n"),
                 HasSubstr("expected a list of 1 to 10000 values"));
+    EXPECT_THAT(complaint(kHead + "[grid]\n\"campaign.table_g\" = [[9, 7], [9, 0], [9, 7]]\n"),
+                AllOf(StartsWith("S.toml:5:"), HasSubstr("grid.\"campaign.table_g\": found "),
+                      HasSubstr(" again, expected each value once")));
     EXPECT_THAT(complaint(kHead + "runs = 0\n"),
                 "S.toml:4:8: study.runs: found 0, expected a whole number from 1 to 10000000");
     EXPECT_THAT(complaint("[study]\nname = 'a'\nkind = 'uncertainty'\n"),

@@ -47,6 +47,26 @@ TEST(Calibration, SeedsShowThatAModelThatDoesNotHoldIsRejected) {
     }
 }
 
+TEST(Calibration, IsTheSameInAnyUnitOfTheInput) {
+    const auto first = readings({0.5, 1}, 2, 11, true);
+    const SensorCalibration c = calibrate(first);
+    for (const double unit : {1e-9, 1e-3, 3600.0, 3.6e5, 1e9}) {
+        auto scaled = first;
+        for (Reading& r : scaled)
+            for (double& x : r.input) x *= unit;
+        const SensorCalibration found = calibrate(scaled);
+        EXPECT_EQ(found.plan.rank, kTerms) << unit;
+        EXPECT_NEAR(found.test->statistic, c.test->statistic, 1e-6 * c.test->statistic) << unit;
+        for (std::size_t k = 0; k < kTerms; ++k) {
+            const double by = std::pow(unit, k == 0 ? 0 : k < 4 ? 1 : 2);
+            EXPECT_NEAR(found.value[k] * by, c.value[k], 1e-6 * c.sigma[k])
+                << kTermNames[k] << unit;
+            EXPECT_NEAR(found.sigma[k] * by, c.sigma[k], 1e-6 * c.sigma[k])
+                << kTermNames[k] << unit;
+        }
+    }
+}
+
 TEST(Calibration, OneSphereLeavesTheBiasAndTheSquaresUndetermined) {
     const SensorCalibration c = calibrate(readings({1}, 2, 7, true));
     EXPECT_EQ(c.plan.rank, 9U);

@@ -135,6 +135,10 @@ TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     EXPECT_LE(json()["run_count"], 20);
     EXPECT_EQ(vibrig("plan --levels 0,6 --targets 0.0001,0,0 --runs 12"), 1) << "out of reach";
     EXPECT_EQ(vibrig("plan --levels 0,60 --runs 12"), 1) << "beyond the shaker's limits";
+    // Those of a rig are not asked for: what would go is said.
+    write("rig.toml", "[vibration]\ntransmission = 0.5\n");
+    expect_refusal("plan --levels 0,6 --config rig.toml", "expected at most 5.4");
+    EXPECT_EQ(vibrig("plan --levels 0,5.4 --config rig.toml"), 0) << error;
     // A target of 0 asks for nothing, but the plan determines everything all the same
     ASSERT_EQ(vibrig("plan --levels 0,6 --targets 0.0025,0,0 --json"), 0) << error;
     EXPECT_EQ(json()["rank"], 10);
@@ -155,6 +159,44 @@ TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     ASSERT_EQ(vibrig("plan --runs 4 --levels 0,6 --done done.json --json"), 0) << error;
     EXPECT_EQ(json()["run_count"], 4);
     EXPECT_EQ(json()["rank"], 10);
+    // They count for what is declared as well: four runs alone determine no coefficient.
+    const Json both = json();
+    ASSERT_EQ(vibrig("plan --runs 16 --levels 0,6 --json"), 0) << error;
+    for (const auto& [name, u] : both["combined_uncertainty"].items()) {
+        EXPECT_GE(u.get<double>(), 0.999 * both["standard_errors"][name].get<double>()) << name;
+        // A plan of as many runs is little better: it has its levels by turns.
+        EXPECT_LT(u.get<double>(), 3 * json()["combined_uncertainty"][name].get<double>()) << name;
+    }
+}
+
+TEST_F(PlanCommand, WhatIsHeldOutTellsOfNoCoefficient) {
+    // GIVEN a plan, one with some of its runs held out, and one without those
+    ASSERT_EQ(vibrig("plan --runs 20 --levels 0,6 -o plan.json"), 0) << error;
+    Json held = Json::parse(content("plan.json")), without = held;
+    auto& runs = without["runs"];
+    const std::size_t kept = runs.size() - 3;
+    for (std::size_t i = kept; i < held["runs"].size(); ++i) held["runs"][i]["role"] = "verify";
+    runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(kept), runs.end());
+    write("held.json", held.dump());
+    write("without.json", without.dump());
+    // WHEN they are judged THEN the last two tell the same, and less than the first
+    const auto judged = [&](const std::string& more) {
+        EXPECT_NE(vibrig("plan --levels 0,6 --json " + more), 2) << error;
+        return json();
+    };
+    const Json all = judged("--evaluate plan.json"), one = judged("--evaluate held.json"),
+               other = judged("--evaluate without.json");
+    EXPECT_EQ(one["rank"], other["rank"]);
+    for (const char* what : {"standard_errors", "combined_uncertainty"}) {
+        for (const auto& [name, sigma] : other[what].items())
+            EXPECT_NEAR(one[what][name].get<double>(), sigma.get<double>(),
+                        1e-9 * sigma.get<double>())
+                << what << ' ' << name;
+    }
+    EXPECT_GT(one["standard_errors"]["D_Fx"], all["standard_errors"]["D_Fx"]);
+    // AND as dwells that are done
+    EXPECT_EQ(judged("--runs 4 --done held.json")["standard_errors"],
+              judged("--runs 4 --done without.json")["standard_errors"]);
 }
 
 TEST_F(PlanCommand, AModelWithoutTermsIsRefused) {
