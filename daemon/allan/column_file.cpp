@@ -27,16 +27,8 @@ constexpr std::size_t kNoColumn = std::numeric_limits<std::size_t>::max();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 bool is_missing(std::string_view field) {
-    return field.empty() || field == "nan" || field == "NaN" || field == "NAN" || field == "NA";
-}
-
-bool parse(std::string_view field, double& value) {
-    if (is_missing(field)) {
-        value = kMissing;
-        return true;
-    }
-    field.remove_prefix(field.front() == '+' ? 1 : 0);
-    return proto::read_number(field, value) && std::isfinite(value);
+    return field.empty() || field == "nan" || field == "NaN" || field == "NAN" || field == "NA" ||
+           field == "null";
 }
 
 std::string shown(std::string_view text) { return "\"" + proto::printable(text, 40) + "\""; }
@@ -49,18 +41,14 @@ class Parser {
     /// `open`: it has no end.
     void line(std::string_view text, bool open = false) {
         ++number_;
-        if (number_ == 1 && text.substr(0, 3) == "\xEF\xBB\xBF") {
-            text.remove_prefix(3);
-        }
+        if (number_ == 1) text = without_mark(text);
         const std::string_view content = proto::trimmed(text);
         if (content.empty()) {
             // The only field of the row is empty; at the end of the file it is no row.
             blank_ += single_ && !file_.values.empty() ? 1U : 0U;
             return;
         }
-        if (content.front() == '#' || content.front() == '%') {
-            return;
-        }
+        if (is_comment(content)) return;
         if (!known_ && first(content)) {
             return;
         }
@@ -117,7 +105,7 @@ class Parser {
             found = next(text);
         }
         double value = 0;
-        if (!parse(found, value)) {
+        if (!read_sample(found, value)) {
             fail("column " + name + ": " + shown(found) + " found, expected a finite number");
         }
         return value;
@@ -142,10 +130,9 @@ class Parser {
         }
         const bool header = std::any_of(fields.begin(), fields.end(), [](const std::string& f) {
             double ignored = 0;
-            return !parse(f, ignored);
+            return !read_sample(f, ignored);
         });
-        // A single word that starts like a number is a broken number, not a name.
-        if (header && fields.size() == 1 && content.find_first_of("0123456789+-.") == 0) {
+        if (header && fields.size() == 1 && !is_name(content)) {
             fail(shown(content) + " found, expected a number or a column's name");
         }
         if (!header) {
@@ -217,6 +204,28 @@ std::unique_ptr<gzFile_s, CloseGz> open(const std::string& path) {
 }
 
 }  // namespace
+
+bool read_sample(std::string_view field, double& value) {
+    if (is_missing(field)) {
+        value = kMissing;
+        return true;
+    }
+    field.remove_prefix(field.front() == '+' ? 1 : 0);
+    return proto::read_number(field, value) && std::isfinite(value);
+}
+
+std::string_view without_mark(std::string_view text) {
+    return text.substr(text.starts_with("\xEF\xBB\xBF") ? 3 : 0);
+}
+
+bool is_comment(std::string_view content) {
+    return content.starts_with('#') || content.starts_with('%');
+}
+
+bool is_name(std::string_view word) {
+    double ignored = 0;
+    return !read_sample(word, ignored) && word.find_first_of("0123456789+-.") != 0;
+}
 
 ColumnFile read_columns(const std::string& path, const ColumnRequest& request,
                         const std::function<void(std::size_t, std::size_t)>& progress) {

@@ -95,13 +95,14 @@ Json deviations(const std::vector<double>& variances, double to_deg_h) {
 }
 
 /// What is the same of a window in a file and of one that has just come: deviations in the unit of
-/// the input.
+/// the input, null where gaps leave none.
 Json window_json(const allan::WindowRow& row, double to_deg_h) {
     return {{"t", row.centre_s},
             {"mean", proto::number_or_null(row.mean)},
             {"missing", row.missing},
             {"refused", row.refused},
-            {"dev", deviations(row.allan, to_deg_h)}};
+            {"dev", deviations(row.allan, to_deg_h)},
+            {"fit", row.refused ? Json(nullptr) : fit_json(row.fit)}};
 }
 
 Json dynamic_json(const AllanAnalysis& analysis) {
@@ -113,7 +114,6 @@ Json dynamic_json(const AllanAnalysis& analysis) {
     Json rows = Json::array();
     for (const auto& [row, alarms] : analysis.windows) {
         Json window = window_json(row, analysis.to_deg_h);
-        window["fit"] = row.refused ? Json(nullptr) : fit_json(row.fit);
         window["classical"] = row.refused ? Json(nullptr) : classical_json(row.classical_fit, taus);
         window["alarms"] = alarms_json(alarms);
         rows.push_back(std::move(window));

@@ -50,7 +50,8 @@ std::string windows_table(const AllanAnalysis& analysis) {
     }
     out += "  alarms\n";
     for (const auto& [row, alarms] : analysis.windows) {
-        out += printed("%12.6g %17.6g", row.centre_s, row.mean);
+        out += printed("%12.6g ", row.centre_s);
+        out += std::isnan(row.mean) ? printed("%17s", "-") : printed("%17.6g", row.mean);
         if (row.refused) {
             out += printed("  refused: %zu samples missing, or nothing varies\n", row.missing);
             continue;

@@ -119,7 +119,9 @@ DynamicSummary summarise(const DynamicAllan& dynamic, const std::vector<WindowRo
         }
         ++summary.windows;
         for (std::size_t k = 0; k < factors.size(); ++k) {
-            allan[k] += row.allan[k];
+            // A window in which gaps leave no difference says nothing of that averaging time.
+            if (!(row.share[k] > 0)) continue;
+            allan[k] += row.share[k] * row.allan[k];
             share[k] += row.share[k];
         }
         for (std::size_t k = 0; k < a.size(); ++k) {
@@ -132,7 +134,7 @@ DynamicSummary summarise(const DynamicAllan& dynamic, const std::vector<WindowRo
     }
     const auto n = static_cast<double>(summary.windows);
     for (std::size_t k = 0; k < factors.size(); ++k) {
-        allan[k] /= n;
+        if (share[k] > 0) allan[k] /= share[k];
         // Degrees of freedom add over the time covered, not over windows that share samples.
         share[k] *= 1 - settings.overlap * (n - 1) / n;
     }

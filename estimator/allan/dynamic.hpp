@@ -23,12 +23,12 @@ struct DynamicSettings {
 struct WindowRow {
     double begin_s = 0;  ///< from the first sample
     double centre_s = 0;
-    double mean = 0;  ///< deg/h
+    double mean = 0;  ///< deg/h, NaN when all are missing
     std::size_t missing = 0;
     bool refused = false;           ///< more than a tenth is missing, or nothing varies: no fit
-    std::vector<double> allan;      ///< (deg/h)^2
-    std::vector<double> classical;  ///< (deg/h)^2
-    std::vector<double> share;      ///< differences present over those of a full window
+    std::vector<double> allan;      ///< (deg/h)^2, NaN where gaps leave no difference
+    std::vector<double> classical;  ///< (deg/h)^2, likewise
+    std::vector<double> share;      ///< degrees of freedom over those of a full window; 0: none
     Fit fit;
     ClassicalFit classical_fit;
 };

@@ -8,6 +8,12 @@
 
 namespace vibrig::estimator::allan {
 
+namespace {
+
+constexpr double kFewestDegrees = 0.5;
+
+}  // namespace
+
 const char* words_of(Reading reading) {
     static constexpr std::array kWords{
         "short averaging times: quantisation or vibration leakage",
@@ -38,7 +44,7 @@ StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
     const std::vector<std::size_t>& factors = dynamic.factors();
     for (const std::size_t m : octave_factors(window_ / 4)) {
         const auto at = std::find(factors.begin(), factors.end(), m);
-        octaves_.push_back({static_cast<std::size_t>(at - factors.begin()), m, 0, 0, 0, {}});
+        octaves_.push_back({static_cast<std::size_t>(at - factors.begin()), m, 0, 0, 1, {}});
     }
 }
 
@@ -57,23 +63,29 @@ void StationarityMonitor::set_bounds(const Terms& terms, double reference_window
     std::vector<std::size_t> factors;
     for (const Octave& octave : octaves_) factors.push_back(octave.m);
     const Eigen::VectorXd spread = covariance_.of(factors, terms).diagonal();
-    const double tail = share_of_alpha() / 2;
+    reference_windows_ = reference_windows;
     for (std::size_t i = 0; i < octaves_.size(); ++i) {
         Octave& octave = octaves_[i];
         const double mean = model_variance(terms, static_cast<double>(octave.m) * tau0_);
         // A ramp alone does not vary at all; half the window is what any noise has at least.
-        const double degrees =
-            std::clamp(window_share_ * 2 * mean * mean / spread[static_cast<Eigen::Index>(i)], 0.5,
-                       static_cast<double>(window_));
-        if (reference_windows > 0) {
-            octave.low = f_quantile(tail, degrees, degrees * reference_windows);
-            octave.high = f_quantile(1 - tail, degrees, degrees * reference_windows);
-        } else {
-            octave.low = chi_square_quantile(tail, degrees) / degrees;
-            octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
-        }
+        octave.degrees =
+            std::clamp(window_share_ * 2 * mean * mean / spread[static_cast<Eigen::Index>(i)],
+                       kFewestDegrees, static_cast<double>(window_));
     }
     mean_sigma_ = std::sqrt(2 * model_variance(terms, static_cast<double>(window_) * tau0_));
+}
+
+StationarityMonitor::Bounds StationarityMonitor::bounds_of(const Octave& octave,
+                                                           double present) const {
+    const double tail = share_of_alpha() / 2;
+    const double degrees = std::max(kFewestDegrees, octave.degrees * present);
+    if (reference_windows_ > 0) {
+        const double taught =
+            std::max(kFewestDegrees, octave.degrees * reference_windows_ * octave.taught);
+        return {f_quantile(tail, degrees, taught), f_quantile(1 - tail, degrees, taught)};
+    }
+    return {chi_square_quantile(tail, degrees) / degrees,
+            chi_square_quantile(1 - tail, degrees) / degrees};
 }
 
 void StationarityMonitor::learn(const WindowRow& row) {
@@ -85,13 +97,19 @@ void StationarityMonitor::learn(const WindowRow& row) {
     const double windows = 1 + (n - 1) * (1 - overlap_);
     std::vector<VariancePoint> curve;
     for (Octave& octave : octaves_) {
-        octave.reference = 0;
+        double sum = 0;
+        double shares = 0;
         for (const WindowRow& lesson : lessons_) {
-            octave.reference += lesson.allan[octave.k] / n;
+            // Gaps may leave no difference.
+            if (!(lesson.share[octave.k] > 0)) continue;
+            sum += lesson.share[octave.k] * lesson.allan[octave.k];
+            shares += lesson.share[octave.k];
         }
+        octave.reference = shares > 0 ? sum / shares : 0;
+        octave.taught = shares / n / window_share_;
         if (octave.reference > 0) {
             curve.push_back({static_cast<double>(octave.m) * tau0_, octave.m, octave.reference,
-                             windows * window_share_});
+                             windows * shares / n});
         }
     }
     lessons_.clear();
@@ -134,14 +152,17 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
     }
     for (std::size_t i = 0; i < octaves_.size(); ++i) {
         Octave& octave = octaves_[i];
+        // Of an averaging time at which gaps leave no difference nothing is known.
+        if (!(row.share[octave.k] > 0) || !(octave.reference > 0)) continue;
         const double ratio = row.allan[octave.k] / octave.reference;
-        if (ratio >= octave.low && ratio <= octave.high) {
+        const Bounds bounds = bounds_of(octave, row.share[octave.k] / window_share_);
+        if (ratio >= bounds.low && ratio <= bounds.high) {
             octave.since.reset();
             continue;
         }
         octave.since = octave.since.value_or(row.begin_s);
         alarms.push_back({reading_of(i, octaves_.size()), static_cast<double>(octave.m) * tau0_,
-                          ratio, ratio < octave.low ? octave.low : octave.high, *octave.since});
+                          ratio, ratio < bounds.low ? bounds.low : bounds.high, *octave.since});
     }
     const double step = means_.size() > back_ && mean_sigma_ > 0
                             ? (means_.back() - means_.front()) / mean_sigma_
@@ -160,7 +181,8 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
 double StationarityMonitor::smallest_change() const {
     double least = 0;
     for (const Octave& octave : octaves_) {
-        const double change = std::sqrt(octave.high) - 1;
+        if (!(octave.reference > 0)) continue;
+        const double change = std::sqrt(bounds_of(octave, 1).high) - 1;
         least = least > 0 ? std::min(least, change) : change;
     }
     return least;

@@ -18,9 +18,10 @@ struct MonitorSettings {
 /// freedom nu = 2 mu^2 / C of that mixture (CurveCovariance). Against an accepted calibration
 /// ratio x nu follows chi-square(nu); against a learnt reference, the mean of n windows that
 /// overlap, the ratio follows F(nu, nu n_eff), n_eff = 1 + (n - 1) (1 - overlap), and a ramp, which
-/// a few windows cannot tell from a walk, counts as the walk that does as much over a window. The
-/// mean of a window less that of the one before it has variance 2 AVAR(T), with a learnt reference
-/// the largest that its slow noise may have. Each gets an equal share of alpha.
+/// a few windows cannot tell from a walk, counts as the walk that does as much over a window. Gaps
+/// take degrees of freedom from window and reference; where they leave none nothing is compared.
+/// The mean of a window less that of the one before it has variance 2 AVAR(T), with a learnt
+/// reference the largest that its slow noise may have. Each gets an equal share of alpha.
 class StationarityMonitor {
   public:
     StationarityMonitor(const MonitorSettings& settings, const DynamicAllan& dynamic);
@@ -31,7 +32,9 @@ class StationarityMonitor {
     /// nothing.
     [[nodiscard]] std::vector<Alarm> check(const WindowRow& row);
 
-    [[nodiscard]] bool has_reference() const { return !octaves_.empty() && octaves_[0].low > 0; }
+    [[nodiscard]] bool has_reference() const {
+        return !octaves_.empty() && octaves_[0].degrees > 0;
+    }
     /// Smallest relative change of N that a window shows at the octave most apt to show it.
     [[nodiscard]] double smallest_change() const;
 
@@ -39,11 +42,17 @@ class StationarityMonitor {
     struct Octave {
         std::size_t k = 0;  ///< index in the row
         std::size_t m = 1;
-        double reference = 0;
-        double low = 0;  ///< bounds of the ratio
-        double high = 0;
+        double reference = 0;  ///< 0: none
+        double degrees = 0;    ///< of freedom of a window without gaps
+        double taught = 1;     ///< part of them that the windows of the reference had
         std::optional<double> since;
     };
+    /// Of the ratio.
+    struct Bounds {
+        double low = 0, high = 0;
+    };
+    /// `present`: degrees of freedom over those of a window without gaps.
+    [[nodiscard]] Bounds bounds_of(const Octave& octave, double present) const;
     void learn(const WindowRow& row);
     void set_bounds(const Terms& terms, double reference_windows);
     [[nodiscard]] double share_of_alpha() const;
@@ -56,6 +65,7 @@ class StationarityMonitor {
     std::size_t back_;  ///< rows from one window to the adjacent one
     double overlap_;
     std::vector<Octave> octaves_;
+    double reference_windows_ = 0;  ///< that taught, as if apart; 0: the reference is exact
     std::vector<WindowRow> lessons_;
     std::vector<double> means_;
     double mean_sigma_ = 0;  ///< of the difference of adjacent means

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
+#include "estimator/allan/edf.hpp"
 #include "estimator/allan/series.hpp"
 
 namespace vibrig::estimator::allan {
@@ -13,6 +15,7 @@ namespace vibrig::estimator::allan {
 namespace {
 
 constexpr double kLargestRelativeError = 1e-9;
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 constexpr double kFalls = 3;  // e-folds of the exponential window
 
@@ -105,6 +108,9 @@ void SlidingVariance::add(double rate) noexcept {
                 --sums.seconds;
             }
         }
+        // Of nothing the sum is zero, whatever rounding has left of what was taken off it.
+        if (sums.firsts == 0) sums.first = sums.first_squares = 0;
+        if (sums.seconds == 0) sums.second = 0;
     }
     if (newest_ % window_ == 0) {
         recompute();
@@ -132,7 +138,8 @@ void SlidingVariance::recompute() noexcept {
         }
         if (pass == 0) {
             // Angles relative to the oldest, without the mean rate: small numbers keep digits.
-            const double shift = mean() - offset_;
+            const double found = mean();
+            const double shift = std::isnan(found) ? 0 : found - offset_;
             double taken = angle_[from & mask_];
             for (std::uint64_t i = from; i <= newest_; ++i) {
                 const bool edge = i > from && start_[i & mask_] != i;
@@ -148,7 +155,7 @@ double SlidingVariance::mean() const noexcept {
     const double present = static_cast<double>(newest_ - oldest() - missing_);
     return present > 0
                ? offset_ + (angle_[newest_ & mask_] - angle_[oldest() & mask_]) / (present * tau0_)
-               : offset_;
+               : kNothing;
 }
 
 double SlidingVariance::allan(std::size_t k) const noexcept {
@@ -156,7 +163,7 @@ double SlidingVariance::allan(std::size_t k) const noexcept {
     const Sums& sums = sums_[k];
     return sums.seconds > 0
                ? std::max(0.0, sums.second) / (2 * tau * tau * static_cast<double>(sums.seconds))
-               : 0;
+               : kNothing;
 }
 
 double SlidingVariance::allan(std::size_t k, WindowShape shape) const noexcept {
@@ -176,14 +183,14 @@ double SlidingVariance::allan(std::size_t k, WindowShape shape) const noexcept {
         squares += w * d * d;
         weights += w;
     }
-    return weights > 0 ? squares / (2 * tau * tau * weights) : 0;
+    return weights > 0 ? squares / (2 * tau * tau * weights) : kNothing;
 }
 
 double SlidingVariance::classical(std::size_t k, double mean) const noexcept {
     const double tau = static_cast<double>(factors_[k]) * tau0_;
     const Sums& sums = sums_[k];
     if (sums.firsts == 0) {
-        return 0;
+        return kNothing;
     }
     const auto n = static_cast<double>(sums.firsts);
     const double centre = mean - offset_;
@@ -191,21 +198,25 @@ double SlidingVariance::classical(std::size_t k, double mean) const noexcept {
                              2 * centre * sums.first / (tau * n) + centre * centre);
 }
 
-SlidingVariance::Tiled SlidingVariance::tiled(std::size_t k) const noexcept {
+template <typename Visit>
+void SlidingVariance::each_part(const Visit& visit) const {
     const std::uint64_t from = oldest();
-    std::uint64_t first = from;
-    std::uint64_t last = from;
     for (std::uint64_t end = newest_ + 1; end > from + 1;) {
         const std::uint64_t begin = std::max(from, start_[(end - 1) & mask_]);
-        if (end - 1 - begin > last - first) {
-            first = begin;
-            last = end - 1;
-        }
+        visit(begin, end - 1);
         end = begin;
-        if (end == from) {
-            break;
-        }
     }
+}
+
+SlidingVariance::Tiled SlidingVariance::tiled(std::size_t k) const noexcept {
+    std::uint64_t first = oldest();
+    std::uint64_t last = first;
+    each_part([&](std::uint64_t begin, std::uint64_t end) {
+        if (end - begin > last - first) {
+            first = begin;
+            last = end;
+        }
+    });
     const std::size_t m = factors_[k];
     const std::size_t tiles = (last - first) / m;
     if (tiles < 2) {
@@ -226,9 +237,19 @@ SlidingVariance::Tiled SlidingVariance::tiled(std::size_t k) const noexcept {
     return {sum / (terms * tau * tau), covered};
 }
 
-double SlidingVariance::share(std::size_t k) const noexcept {
-    const auto all = static_cast<double>(window_ + 1 - 2 * factors_[k]);
-    return static_cast<double>(sums_[k].seconds) / all;
+double SlidingVariance::share(std::size_t k) const {
+    const std::size_t m = factors_[k];
+    const auto degrees = [m](std::size_t points) { return edf(Statistic::oadev, 0, points, m); };
+    double terms = 0;
+    double spread = 0;
+    // As of a record with gaps (deviations()): Welch and Satterthwaite's rule joins the parts.
+    each_part([&](std::uint64_t begin, std::uint64_t end) {
+        if (end - begin < 2 * m) return;
+        const auto here = static_cast<double>(end - begin + 1 - 2 * m);
+        terms += here;
+        spread += here * here / degrees(end - begin + 1);
+    });
+    return terms > 0 ? terms * terms / spread / degrees(window_ + 1) : 0;
 }
 
 }  // namespace vibrig::estimator::allan

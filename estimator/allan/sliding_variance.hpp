@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace vibrig::estimator::allan {
@@ -28,22 +29,24 @@ class SlidingVariance {
     [[nodiscard]] std::size_t missing() const noexcept { return missing_; }
     [[nodiscard]] const std::vector<std::size_t>& factors() const noexcept { return factors_; }
 
+    /// NaN when all samples are missing.
     [[nodiscard]] double mean() const noexcept;
-    /// Rate unit squared, 0 without terms.
+    /// Rate unit squared, NaN when gaps leave no difference.
     [[nodiscard]] double allan(std::size_t k) const noexcept;
     /// The same with the weights of `shape`. Costs one pass over the window.
     [[nodiscard]] double allan(std::size_t k, WindowShape shape) const noexcept;
     /// Variance of overlapping averages about `mean`.
     [[nodiscard]] double classical(std::size_t k, double mean) const noexcept;
     struct Tiled {
-        double variance = 0;      ///< about the mean of the tiles
+        double variance = std::numeric_limits<double>::quiet_NaN();  ///< about the tiles' mean
         std::size_t covered = 0;  ///< samples, 0: fewer than two tiles between gaps
     };
     /// Classical variance of averages side by side in the longest part without gaps, averaged over
     /// all positions of the first. Costs one pass over the window.
     [[nodiscard]] Tiled tiled(std::size_t k) const noexcept;
-    /// Second differences in the window over those of a window without gaps.
-    [[nodiscard]] double share(std::size_t k) const noexcept;
+    /// Degrees of freedom of allan(k) over those of a window without gaps, for white noise; 0:
+    /// none.
+    [[nodiscard]] double share(std::size_t k) const;
 
     /// Once per window the sums are computed anew: how often they were off by more than 1e-9.
     [[nodiscard]] std::uint64_t faults() const noexcept { return faults_; }
@@ -62,6 +65,9 @@ class SlidingVariance {
     }
     void enter(std::size_t m, std::uint64_t end, double sign, Sums& sums) const noexcept;
     void recompute() noexcept;
+    /// First and last angle of each part without gaps.
+    template <typename Visit>
+    void each_part(const Visit& visit) const;
 
     double tau0_;
     std::size_t window_;

@@ -18,6 +18,7 @@ constexpr double kNoMotion_s = 60;
 constexpr double kRateTolerance = 0.1;
 constexpr double kSlowest_deg_s = 0.1;  // below it the read-out's noise hides the rate
 constexpr double kLargestZero_mg = 10;
+constexpr double kNearTwoG_mg = 200;  // so far the filter may be from 2 g when it is sure enough
 constexpr std::size_t kBlock = 60;
 constexpr double kLargestGain = 0.02;  // of a gyro; beyond it is another fault
 
@@ -286,6 +287,15 @@ struct Calibration::Impl {
         watch_convergence(point);
         for (std::size_t i = 0; i < 3; ++i) {
             if (point.sigma_mg[i] < 1 && std::abs(point.zero_mg[i]) > kLargestZero_mg) {
+                if (i == 2 && stands_on_its_head(point.zero_mg[i])) {
+                    const bool down = settings.inverted;
+                    return give_up(
+                        text("zero of accelerometer %c is %.4g mg, about 2 g: the unit stands "
+                             "with %c %s, expected %s (the wrong file, or --inverted of `vibrig "
+                             "zero` %s)",
+                             name(i), point.zero_mg[i], name(i), down ? "up" : "down",
+                             down ? "down" : "up", down ? "is too much" : "is missing"));
+                }
                 return give_up(
                     text("zero of accelerometer %c is %.4g mg, outside the small-error range of "
                          "%.0f mg: level first",
@@ -297,6 +307,11 @@ struct Calibration::Impl {
         force_sum.setZero();
         force_squares.setZero();
         return true;
+    }
+
+    /// Gravity with the wrong sign looks like a zero of 2 g.
+    [[nodiscard]] bool stands_on_its_head(double zero_mg) const {
+        return std::abs(zero_mg - (settings.inverted ? 2000 : -2000)) < kNearTwoG_mg;
     }
 
     void watch_convergence(const CalibrationTrace& now) {

@@ -160,7 +160,7 @@ void add_allan(CLI::App& app, int& exit_code) {
         ->check(proto::charts(true, true));
     // A window is printed and gone.
     for (const char* whole :
-         {"--fit", "--taus", "--type", "--drop-outliers", "--column", "--time"}) {
+         {"--fit", "--confidence", "--taus", "--type", "--drop-outliers", "--column", "--time"}) {
         command.get_option("--live")->excludes(command.get_option(whole));
     }
     command.footer(

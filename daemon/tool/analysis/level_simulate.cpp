@@ -36,6 +36,11 @@ levelling::Scenario scenario_of(const Options& options) {
         throw std::invalid_argument(printed(
             "--step: found %g without --step-at, expected the time of the step", options.step));
     }
+    if (options.step_s >= start.duration_s) {
+        throw std::invalid_argument(
+            printed("--step-at: found %g s, expected less than the %g s of --duration",
+                    options.step_s, start.duration_s));
+    }
     start.seed = options.seed;
     return start;
 }
@@ -134,18 +139,21 @@ int run_many(const Options& options) {
                               {"median_s", proto::number_or_null(many.time_within(0.5))},
                               {"p95_s", proto::number_or_null(many.time_within(0.95))},
                               {"longest_s", proto::number_or_null(many.time_within(1))},
-                              {"worst_tilt_arcmin", many.worst_tilt / kRadPerArcmin},
+                              {"worst_tilt_arcmin", many.times.empty()
+                                                        ? Json(nullptr)
+                                                        : Json(many.worst_tilt / kRadPerArcmin)},
                               {"tolerance_arcmin", tolerance / kRadPerArcmin}})
                   << '\n';
     } else {
         std::cout << printed("%zu of %zu settled, %zu later than %.5g s, %zu declared falsely\n",
-                             many.times.size(), options.runs, many.late, many.bound, many.falsely)
-                  << printed(
-                         "time after the start or the step: median %.5g s, 95 %% within %.5g s, "
-                         "longest %.5g s\nlargest tilt when declared, besides the accelerometers' "
-                         "zero, %.3g' (tolerance %.3g')\n",
-                         many.time_within(0.5), many.time_within(0.95), many.time_within(1),
-                         many.worst_tilt / kRadPerArcmin, tolerance / kRadPerArcmin);
+                             many.times.size(), options.runs, many.late, many.bound, many.falsely);
+        if (!many.times.empty())
+            std::cout << printed(
+                "time after the start or the step: median %.5g s, 95 %% within %.5g s, "
+                "longest %.5g s\nlargest tilt when declared, besides the accelerometers' "
+                "zero, %.3g' (tolerance %.3g')\n",
+                many.time_within(0.5), many.time_within(0.95), many.time_within(1),
+                many.worst_tilt / kRadPerArcmin, tolerance / kRadPerArcmin);
     }
     return many.never == 0 && 20 * many.late <= options.runs && many.falsely == 0 ? 0 : kNo;
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <random>
 
 #include "estimator/allan/dynamic.hpp"
 #include "estimator/allan/monitor.hpp"
@@ -239,6 +240,83 @@ TEST(Monitor, MonteCarloALearntReferenceHoldsItsRateOnAnyMixture) { expect_rate(
 
 // Too few for a limit from below: 2.4 of each mixture expected, and those share their seeds.
 TEST(Monitor, MonteCarloALearntReferenceHoldsTheDefaultRate) { expect_rate(1e-3, 60, 0); }
+
+/// Counts windows of white noise in which each sample is missing by chance.
+Alarms with_gaps(double missing, bool taught, double alpha, unsigned runs) {
+    constexpr std::size_t kWindow = 1000;
+    constexpr std::uint64_t kSeed = 9100;
+    Alarms out;
+    for (unsigned run = 0; run < runs; ++run) {
+        DynamicSettings wanted = settings(kWindow);
+        wanted.fits = false;
+        DynamicAllan dynamic(wanted);
+        StationarityMonitor monitor({alpha, 5}, dynamic);
+        if (!taught) monitor.set_reference({0, kN, 0, 0, 0});
+        std::mt19937_64 generator(kSeed + 1000 + run);
+        std::bernoulli_distribution gone(missing);
+        for (const double y : white(60 * kWindow, kSigma, kSeed + run)) {
+            if (!dynamic.add(gone(generator) ? kNaN : y)) continue;
+            const bool compared = monitor.has_reference();
+            const WindowRow row = dynamic.row();
+            EXPECT_FALSE(row.refused);
+            const auto alarms = monitor.check(row);
+            for (const Alarm& alarm : alarms) {
+                EXPECT_TRUE(std::isfinite(alarm.ratio)) << alarm.tau;
+                EXPECT_TRUE(alarm.ratio > 0 || alarm.reading == Reading::mean_step) << alarm.tau;
+            }
+            out.windows += compared ? 1 : 0;
+            out.alarmed += alarms.empty() ? 0 : 1;
+        }
+        EXPECT_EQ(dynamic.faults(), 0U) << missing;
+    }
+    return out;
+}
+
+TEST(Monitor, MonteCarloGapsRaiseNoFalseAlarms) {
+    // GIVEN white noise of 24 seeds, and 0, 1 and 5 % of its samples missing at random: of the
+    // longest averaging times few differences are left in a window, or none
+    constexpr double kAlpha = 0.02;
+    for (const bool taught : {false, true}) {
+        for (const double missing : {0.0, 0.01, 0.05}) {
+            const Alarms found = with_gaps(missing, taught, kAlpha, 24);
+            std::printf("%g %% missing, %s: %d of %d windows alarmed\n", 100 * missing,
+                        taught ? "learnt" : "given", found.alarmed, found.windows);
+            // THEN the stated share of the windows has an alarm, within three standard errors of a
+            // count in clusters of two: they overlap by half. Octaves that alarm together make it
+            // less, and a learnt reference takes the means' steps for slow noise.
+            const double most = kAlpha * found.windows;
+            const double least = 0.6 * most;
+            EXPECT_LE(found.alarmed, most + 3 * std::sqrt(2 * most)) << "seeds from 9100";
+            EXPECT_GE(found.alarmed, least - 3 * std::sqrt(2 * least)) << "seeds from 9100";
+        }
+    }
+}
+
+TEST(Monitor, SaysNothingOfAnAveragingTimeThatGapsLeaveNothingOf) {
+    // GIVEN windows of 100 s of which every second one has gaps that no difference of 50 s spans
+    DynamicAllan dynamic(settings(100, 0.0));
+    StationarityMonitor monitor({1e-3, 4}, dynamic);
+    std::vector<double> rate = white(800, kSigma, 12);
+    for (std::size_t i = 0; i < rate.size(); ++i) {
+        if (i / 100 % 2 == 1 && i % 20 == 10) rate[i] = kNaN;
+    }
+    std::vector<WindowRow> rows;
+    for (const double y : rate) {
+        if (!dynamic.add(y)) continue;
+        rows.push_back(dynamic.row());
+        EXPECT_TRUE(monitor.check(rows.back()).empty()) << rows.size();
+    }
+    ASSERT_EQ(rows.size(), 8U);
+    // THEN those have no value there, no alarm, and no part in the reference or in the summary
+    const std::size_t last = dynamic.factors().size() - 1;
+    EXPECT_TRUE(std::isnan(rows[1].allan[last]));
+    EXPECT_EQ(rows[1].share[last], 0);
+    EXPECT_GT(rows[2].allan[last], 0);
+    EXPECT_TRUE(monitor.has_reference());
+    EXPECT_GT(monitor.smallest_change(), 0);
+    EXPECT_NEAR(summarise(dynamic, rows).fit.values()[static_cast<std::size_t>(Term::N)], kN,
+                0.1 * kN);
+}
 
 TEST(Monitor, AnAlarmEndsWithItsCause) {
     DynamicAllan dynamic(settings(512, 0.0));

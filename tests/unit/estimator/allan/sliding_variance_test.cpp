@@ -18,7 +18,7 @@ double batch(const std::vector<double>& rate, std::size_t window, std::size_t m)
     const std::span<const double> last = std::span(rate).last(window);
     const auto points =
         deviations(Series::from_rate(last, 0.5), Statistic::oadev, std::vector<std::size_t>{m});
-    return points.empty() ? 0 : points[0].dev * points[0].dev;
+    return points.empty() ? kNaN : points[0].dev * points[0].dev;
 }
 
 double batch_classical(const std::vector<double>& rate, std::size_t window, std::size_t m,
@@ -71,6 +71,11 @@ TEST(SlidingVariance, EqualsTheBatchAtEveryLengthOfStreamWithGapsAndAnOffset) {
         ASSERT_NEAR(sliding.mean(), mean, 1e-11) << seen.size();
         for (std::size_t k = 0; k < factors.size(); ++k) {
             const double expected = batch(seen, kWindow, factors[k]);
+            ASSERT_EQ(sliding.share(k) > 0, std::isfinite(expected)) << seen.size();
+            if (std::isnan(expected)) {
+                ASSERT_TRUE(std::isnan(sliding.allan(k))) << factors[k];
+                continue;
+            }
             ASSERT_NEAR(sliding.allan(k), expected, 1e-9 * expected + 1e-18)
                 << "m = " << factors[k] << " after " << seen.size();
             if (factors[k] <= 25) {
@@ -99,6 +104,69 @@ TEST(SlidingVariance, CountsAFaultWhenARunningSumHasLostItsDigits) {
         expected += std::pow(rate[i + 1] - rate[i], 2) / (2 * 63.0);
     }
     EXPECT_NEAR(sliding.allan(0), expected, 1e-9 * expected);
+}
+
+TEST(SlidingVariance, WhereGapsLeaveNothingThereIsNoValueAndNoFault) {
+    // GIVEN a window with a gap in its middle
+    constexpr std::size_t kWindow = 32;
+    SlidingVariance sliding(1.0, kWindow, {1, 4, 12});
+    std::vector<double> rate = white(kWindow, 0.1, 5);
+    for (double& y : rate) y += 15;
+    rate[16] = kNaN;
+    for (const double y : rate) sliding.add(y);
+    // THEN what needs more than is left on either side has no value, by whatever weights
+    EXPECT_GT(sliding.allan(1), 0);
+    for (const WindowShape shape :
+         {WindowShape::rectangular, WindowShape::hann, WindowShape::exponential})
+        EXPECT_TRUE(std::isnan(sliding.allan(2, shape)));
+    EXPECT_EQ(sliding.share(2), 0);
+    // WHEN nothing comes for three windows THEN there is no mean, and none of an earlier one
+    for (std::size_t i = 0; i < 3 * kWindow; ++i) sliding.add(kNaN);
+    EXPECT_EQ(sliding.missing(), kWindow);
+    EXPECT_TRUE(std::isnan(sliding.mean()));
+    for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_TRUE(std::isnan(sliding.allan(k))) << k;
+        EXPECT_TRUE(std::isnan(sliding.classical(k, 0))) << k;
+        EXPECT_TRUE(std::isnan(sliding.tiled(k).variance)) << k;
+    }
+    // AND afterwards all is as of the samples alone
+    rate = white(kWindow, 0.1, 6);
+    double mean = 0;
+    for (double& y : rate) mean += (y += 15) / kWindow;
+    for (const double y : rate) sliding.add(y);
+    EXPECT_NEAR(sliding.mean(), mean, 1e-12);
+    double expected = 0;
+    for (std::size_t i = 1; i < kWindow; ++i)
+        expected += std::pow(rate[i] - rate[i - 1], 2) / (2 * (kWindow - 1.0));
+    EXPECT_NEAR(sliding.allan(0), expected, 1e-9 * expected);
+    EXPECT_EQ(sliding.share(0), 1);
+    EXPECT_EQ(sliding.faults(), 0U);
+}
+
+TEST(SlidingVariance, MonteCarloTheShareIsThatOfTheDegreesOfFreedomBetweenGaps) {
+    // GIVEN white noise of variance 1 with the same gaps, 1 % of the samples, in 4000 windows
+    constexpr std::size_t kWindow = 400;
+    constexpr unsigned kRuns = 4000;
+    const std::vector<std::size_t> factors{1, 8, 32};
+    std::vector<double> squares(factors.size(), 0.0), share(factors.size(), 0.0);
+    for (unsigned run = 0; run < kRuns; ++run) {
+        SlidingVariance sliding(1.0, kWindow, factors);
+        std::vector<double> rate = white(kWindow, 1, 9400 + run);
+        for (const std::size_t gone : {70U, 150U, 260U, 275U}) rate[gone] = kNaN;
+        for (const double y : rate) sliding.add(y);
+        for (std::size_t k = 0; k < factors.size(); ++k) {
+            const double relative = sliding.allan(k) * static_cast<double>(factors[k]) - 1;
+            squares[k] += relative * relative / kRuns;
+            share[k] = sliding.share(k);
+        }
+    }
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+        // THEN the variance varies by 2 over the degrees stated. A variance of 4000 is known within
+        // sqrt(2 / 4000) = 2.2 %, of few degrees twice that; SP 1065 is good to 5 %.
+        const double degrees = share[k] * edf(Statistic::oadev, 0, kWindow + 1, factors[k]);
+        EXPECT_NEAR(squares[k] * degrees / 2, 1, 4 * 0.03 + 0.05)
+            << "m = " << factors[k] << ", seeds from 9400";
+    }
 }
 
 TEST(SlidingVariance, RefusesAWindowTooShortForItsFactors) {

@@ -291,6 +291,78 @@ TEST_F(AllanCommand, ChartAndWordsSayTheSame) {
     }
 }
 
+TEST_F(AllanCommand, WindowsSayNothingOfWhatGapsLeaveNothingOf) {
+    // GIVEN 24 windows, the 13th and 14th without any sample, the last with a gap each 20 s
+    std::string text;
+    std::size_t i = 0;
+    for (const double y : vibrig::test::white(12000, 0.06, 42)) {
+        const bool gone = (i >= 6000 && i < 7000) || (i >= 11500 && i % 20 == 0);
+        text += gone ? "nan\n" : std::to_string(15 + y) + "\n";
+        ++i;
+    }
+    write("holes.txt", text);
+    const std::string options = " --tau0 1 --dynamic 500 --overlap 0";
+    ASSERT_EQ(vibrig("allan holes.txt --json" + options), 1) << error;
+    const Json dynamic = Json::parse(out)["dynamic"];
+    const Json& rows = dynamic["rows"];
+    ASSERT_EQ(rows.size(), 24U);
+    // THEN nothing is there of nothing
+    for (const std::size_t k : {12U, 13U}) {
+        EXPECT_TRUE(rows[k]["mean"].is_null()) << rows[k]["mean"];
+        EXPECT_TRUE(rows[k]["refused"]);
+        for (const Json& dev : rows[k]["dev"]) EXPECT_TRUE(dev.is_null()) << dev;
+    }
+    // AND it is no alarm, nor a fault of the sums
+    EXPECT_TRUE(rows[23]["dev"].back().is_null()) << rows[23]["dev"];
+    EXPECT_GT(rows[23]["dev"][0], 0);
+    EXPECT_FALSE(rows[23]["refused"]);
+    for (const Json& row : rows) EXPECT_EQ(row["alarms"].size(), 0U) << row["alarms"];
+    EXPECT_EQ(dynamic["summary"]["recomputation_faults"], 0);
+    ASSERT_EQ(vibrig("allan holes.txt" + options), 1) << error;
+    EXPECT_NE(out.find("                 -  refused: 500 samples missing"), std::string::npos)
+        << out;
+    EXPECT_EQ(out.find("nan"), std::string::npos) << out;
+    ASSERT_EQ(vibrig("allan - --live" + options + " <holes.txt"), 1) << error;
+    EXPECT_NE(out.find("6250 s  mean             - deg/h  refused"), std::string::npos) << out;
+    ASSERT_EQ(vibrig("allan - --live --json" + options + " <holes.txt"), 1) << error;
+    EXPECT_NE(out.find("\"refused\":true,\"dev\":[null"), std::string::npos) << out;
+}
+
+TEST_F(AllanCommand, LiveReadsWhatAFileMayHave) {
+    // GIVEN a mark of the byte order, a name, comments, blanks, signs and what is missing
+    std::string text = "\xEF\xBB\xBF# of gyro 1\n\n\"rate\"\r\n% still none\n";
+    int i = 0;
+    for (const double y : vibrig::test::white(1000, 0.06, 9)) {
+        const char* const missing[] = {"nan", "NaN", "NAN", "NA", "null", ""};
+        if (i % 100 == 50) text += std::string(missing[i / 100 % 6]) + '\n';
+        text += (y > 0 ? "+" : "") + std::to_string(y) + "\r\n";
+        text += i % 300 == 100 ? "# later\n" : "";
+        ++i;
+    }
+    write("all.txt", text);
+    const std::string options = " --tau0 1 --dynamic 500 --json";
+    // THEN its windows are those of the file
+    ASSERT_EQ(vibrig("allan all.txt" + options), 0) << error;
+    const Json whole = Json::parse(out)["dynamic"]["rows"];
+    ASSERT_EQ(vibrig("allan - --live" + options + " <all.txt"), 0) << error;
+    std::istringstream lines(out);
+    std::size_t rows = 0;
+    for (std::string line; std::getline(lines, line); ++rows) {
+        const Json row = Json::parse(line);
+        for (const char* key : {"t", "mean", "missing", "dev", "fit", "alarms"})
+            EXPECT_EQ(row[key], whole.at(rows)[key]) << key;
+        EXPECT_NEAR(row["fit"]["N"]["value"], 0.001, 2e-4) << "as the text shows";
+    }
+    EXPECT_EQ(rows, whole.size());
+    // AND what is neither is refused with its line
+    write("two.txt", "time,rate\n1,2\n");
+    expect_refusal("allan - --live" + options + " <two.txt", {"standard input:1", "'time,rate'"});
+    write("word.txt", "rate\n1\nrate\n");
+    expect_refusal("allan - --live" + options + " <word.txt", {"standard input:3", "'rate'"});
+    write("broken.txt", "1.2.3\n1\n");
+    expect_refusal("allan - --live" + options + " <broken.txt", {"standard input:1", "'1.2.3'"});
+}
+
 TEST_F(AllanCommand, LivePrintsWindowsAsTheyComplete) {
     write("louder.txt", noise(6000, 0.06) + noise(2000, 0.12));
     for (const std::string unit : {"", " --unit deg/s"}) {
@@ -317,6 +389,10 @@ TEST_F(AllanCommand, LivePrintsWindowsAsTheyComplete) {
     expect_refusal("allan - --tau0 1 --dynamic 500 --live <word.txt",
                    {"standard input:3", "'three'", "expected a number"});
     expect_refusal("allan - --tau0 1 --dynamic 500 --live", {"0 samples came", "500"});
+    expect_refusal("allan - --tau0 0.5 --dynamic 1e9 --live",
+                   {"--dynamic: found 1e+09 s, 2e+09 samples", "at most 10000000"});
+    expect_refusal("allan - --tau0 1 --dynamic 500 --live --confidence 0.9",
+                   {"--live", "--confidence"});
     expect_refusal("allan word.txt --tau0 1 --dynamic 500 --live", {"--live", "standard input"});
     expect_refusal("allan - --tau0 1 --dynamic 500 --shape square --live", {"--shape", "square"});
     expect_refusal("allan - --tau0 1 --dynamic 500 --live --plot x.svg", {"x.svg", ".html"});

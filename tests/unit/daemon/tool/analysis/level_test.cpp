@@ -72,6 +72,13 @@ TEST_F(LevelCommand, SimulatesAStart) {
     EXPECT_NE(out.find("largest tilt when declared, besides the accelerometers' zero, "),
               std::string::npos)
         << out;
+    // Of none there is no median.
+    EXPECT_EQ(vibrig("level simulate --runs 3 --network undamped"), 1);
+    EXPECT_NE(out.find("0 of 3 settled"), std::string::npos) << out;
+    EXPECT_EQ(out.find("median"), std::string::npos) << out;
+    const Json none = json("level simulate --runs 3 --network undamped", 1);
+    for (const char* key : {"median_s", "p95_s", "longest_s", "worst_tilt_arcmin"})
+        EXPECT_TRUE(none[key].is_null()) << key;
     // Six degrees are not for this loop; a loop given no time has not settled.
     EXPECT_EQ(vibrig("level simulate --tilt 400,0"), 1);
     EXPECT_NE(out.find("coarse levelling first"), std::string::npos);
@@ -121,6 +128,10 @@ TEST_F(LevelCommand, RefusesBadInput) {
     expect_refusal("level simulate --step 2", "--step: found 2 without --step-at");
     expect_refusal("level simulate --step-at 2", "--step");
     // No option is taken and left aside.
+    expect_refusal("level simulate --step 5 --step-at 1000",
+                   "--step-at: found 1000 s, expected less than the 310 s of --duration");
+    expect_refusal("level simulate --step 5 --step-at 40 --duration 40",
+                   "--step-at: found 40 s, expected less than the 40 s of --duration");
     expect_refusal("level simulate --runs 5 --plot x.svg", "--plot: found x.svg with --runs 5");
     expect_refusal("level simulate --runs 5 --step 2 --step-at 9",
                    "--step-at: found 9 with --runs 5");

@@ -43,7 +43,9 @@ TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {
         EXPECT_FALSE(axis["converged_s"].is_null());
     }
     EXPECT_NE(content("zeros.svg").find("<svg"), std::string::npos);
-    EXPECT_EQ(vibrig("zero run.csv --azimuth none --inverted"), 1);  // the wrong way up
+    EXPECT_EQ(vibrig("zero run.csv --azimuth none --inverted"), 1);
+    EXPECT_NE(out.find("about 2 g: the unit stands with z up, expected down"), std::string::npos)
+        << out;
     expect_refusal("zero run.csv --azimuth heading", "heading");
     expect_refusal("zero none.csv", "none.csv");
 }
@@ -90,7 +92,17 @@ TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {
     }
     // WHEN the second file is z up too THEN it is not valid, and it is said which
     EXPECT_EQ(vibrig("zero up.csv --down up.csv"), 1) << out;
-    EXPECT_NE(out.find("not valid: z down: "), std::string::npos) << out;
+    EXPECT_NE(out.find("not valid: z down: zero of accelerometer z is "), std::string::npos) << out;
+    EXPECT_NE(out.find("stands with z up, expected down (the wrong file, or --inverted of `vibrig "
+                       "zero` is too much)"),
+              std::string::npos)
+        << out;
+    EXPECT_EQ(vibrig("zero down.csv"), 1) << out;
+    EXPECT_NE(out.find("stands with z down, expected up (the wrong file, or --inverted of `vibrig "
+                       "zero` is missing)"),
+              std::string::npos)
+        << out;
+    EXPECT_EQ(out.find("level first"), std::string::npos) << out;
     // AND a folder takes the charts of both
     std::filesystem::create_directory(folder_ / "charts");
     EXPECT_EQ(vibrig("zero up.csv --down down.csv --plot charts"), 0) << error;
