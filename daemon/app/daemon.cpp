@@ -5,6 +5,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -26,6 +27,16 @@ void tell(rt::Ring<RtEvent>& ring, Severity severity, const char* source,
     std::strncpy(event.source.data(), source, event.source.size() - 1);
     std::strncpy(event.text.data(), text, event.text.size() - 1);
     ring.try_push(event);
+}
+
+/// Of which the campaign's quadratic coefficients will be, Hz; 0: only its result says it.
+double one_frequency(const configuration::Configuration& of) {
+    const bool several = std::ranges::any_of(of.campaign.stops, [&](const campaign::Stop& stop) {
+        return !stop.verify && (stop.random || stop.sweep.any() ||
+                                (stop.frequency_hz > 0 &&
+                                 !estimator::at_reference(of.estimator, stop.frequency_hz)));
+    });
+    return several ? 0 : of.estimator.frequency_hz;
 }
 
 std::unique_ptr<fleet::Publisher> make_publisher(StatusSource& source, Parts& parts) {
@@ -125,7 +136,7 @@ void Daemon::open_outbox() {
         archive::Outbox::Unit{
             configuration.paperwork.unit_serial,
             configuration.campaign.type_prior ? configuration.paperwork.unit_type : "",
-            configuration.simulated()},
+            configuration.simulated(), one_frequency(configuration)},
         parts_.events.sink("archive"));
     parts_.outbox->start();
 }

@@ -83,7 +83,7 @@ std::string shown(const std::string& where) {
 }
 
 Database::Database(const std::string& where, Mode mode)
-    : name_(shown(where)), server_(is_server(where)) {
+    : name_(shown(where)), server_(is_server(where)), mode_(mode) {
     guarded([&] {
         connect(where, mode);
         const int found = version();

@@ -25,6 +25,7 @@ class Database {
 
     [[nodiscard]] soci::session& sql() noexcept { return *session_; }
     [[nodiscard]] const std::string& name() const noexcept { return name_; }
+    [[nodiscard]] bool writes() const noexcept { return mode_ != Mode::read; }
     /// 0: a file with no tables, or one that has them without a number.
     [[nodiscard]] int version();
 
@@ -56,6 +57,7 @@ class Database {
 
     std::string name_;
     bool server_;
+    Mode mode_;
     std::unique_ptr<soci::session> session_;
 };
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/archive/manifest.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
@@ -27,7 +28,24 @@ double number_in(const Json& object, const char* key) {
     return found != object.end() && found->is_number() ? found->get<double>() : kNothing;
 }
 
-void take_coefficients(const Json& root, Entry& to) {
+/// As the result says it; where it speaks of no other frequency, that of the configuration.
+double at_hz_of(const Json& root, const Json& parameter, double frequency_hz) {
+    if (!parameter.contains("at_hz"))
+        return root.contains("spectrum") ? kAtNoFrequency : frequency_hz;
+    const double said = number_in(parameter, "at_hz");
+    return said >= 0 ? said : kAtNoFrequency;
+}
+
+/// Whether nothing shook in any dwell: what is known of quadratic coefficients is gravity's then.
+bool at_rest(const Json& root) {
+    const Json rates = root.value("dwell_rates", Json::array());
+    return !rates.empty() && std::ranges::all_of(rates, [](const Json& rate) {
+        return number_in(rate, "level") == 0;
+    });
+}
+
+void take_coefficients(const Json& root, double frequency_hz, Entry& to) {
+    if (at_rest(root)) frequency_hz = 0;
     const Json& list = root.at("parameters");
     for (std::size_t i = 0; i < std::min(list.size(), to.coefficients.size()); ++i) {
         const Json& one = list[i];
@@ -38,6 +56,7 @@ void take_coefficients(const Json& root, Entry& to) {
         if (!std::isfinite(of.u_a)) of.u_a = sigma;
         if (!std::isfinite(of.u)) of.u = of.u_a;
         if (!std::isfinite(of.expanded)) of.expanded = 2 * of.u;
+        if (is_quadratic(i)) of.at_hz = at_hz_of(root, one, frequency_hz);
         to.coefficients[i] = of;
     }
     const char* const which =
@@ -60,7 +79,8 @@ void take_temperatures(const std::vector<record::ConditionRow>& rows,
     }
 }
 
-void take_settings(const record::Campaign& part, Entry& to) {
+/// The frequency of its vibration, Hz.
+double take_settings(const record::Campaign& part, Entry& to) {
     const auto settings =
         configuration::parse(record::identification_sections(part.head.configuration),
                              "configuration in " + part.path, false)
@@ -73,15 +93,16 @@ void take_settings(const record::Campaign& part, Entry& to) {
     const auto& noise = settings.estimator;
     to.noise = {{"configured angle, arcsec", noise.resolver_arcsec},
                 {"configured random walk, deg/sqrt(h)", noise.gyro_random_walk_deg_per_rt_h}};
+    return settings.estimator.frequency_hz;
 }
 
 }  // namespace
 
-void take_result(const std::string& result_json, Entry& to) {
+void take_result(const std::string& result_json, double frequency_hz, Entry& to) {
     const Json root = Json::parse(result_json, nullptr, false);
     if (!root.is_object()) return;
     try {
-        take_coefficients(root, to);
+        take_coefficients(root, frequency_hz, to);
         to.nis = std::max(0.0, number_in(root, "nis"));
         if (root.contains("verdict")) {
             to.verdict = root.at("verdict").value("word", "");
@@ -115,6 +136,7 @@ Entry read_recorded(const std::string& folder) {
     Entry entry;
     std::map<std::string, std::vector<double>> degrees;
     std::string result;
+    double frequency_hz = 0;
     for (const auto& [number, path] : parts) {
         if (record::WriterLock::held(path))
             throw ArchiveError(path + ": is being written; a campaign is archived when it is over");
@@ -140,11 +162,11 @@ Entry read_recorded(const std::string& folder) {
         entry.instruction_set = part.head.instruction_set;
         entry.configuration_hash = part.head.configuration_hash;
         entry.dwells += static_cast<std::int64_t>(part.parts.front().dwells);
-        take_settings(part, entry);
+        frequency_hz = take_settings(part, entry);
         take_temperatures(part.conditions, degrees);
         if (!part.result_json.empty()) result = part.result_json;
     }
-    take_result(result, entry);
+    take_result(result, frequency_hz, entry);
     for (const auto& [sensor, of] : degrees) {
         double sum = 0;
         for (const double t : of) sum += t;

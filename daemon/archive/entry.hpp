@@ -23,6 +23,10 @@ class Refused : public ArchiveError {
     using ArchiveError::ArchiveError;
 };
 
+/// Of quadratic coefficients that several frequencies share though they differ there, or of which
+/// the recording does not say it.
+inline constexpr double kAtNoFrequency = -1;
+
 /// One coefficient of a campaign's result; deg/h, deg/h/g, deg/h/g^2.
 struct Coefficient {
     double value = 0;
@@ -30,7 +34,12 @@ struct Coefficient {
     double u_a = 0;    ///< of what differs from campaign to campaign; sigma without an assessment
     double u = 0;      ///< combined standard uncertainty, likewise
     double expanded = 0;
+    /// Of which vibration a quadratic one is: its frequency, Hz; 0: static; kAtNoFrequency.
+    /// Nothing: a linear one, or noted before the index kept it.
+    std::optional<double> at_hz = {};
 };
+/// Nothing where it is not determined, in the order of parameter_names().
+using Coefficients = std::array<std::optional<Coefficient>, estimator::kParameters>;
 
 struct Instrument {
     std::string name, serial, certificate, due;
@@ -63,8 +72,7 @@ struct Entry {
     double nis = 0;  ///< per degree of freedom; 0: none
     std::int64_t dwells = 0;
     bool superseded = false;  ///< it went on later: another entry has all of it
-    /// Nothing where it is not determined, in the order of parameter_names().
-    std::array<std::optional<Coefficient>, estimator::kParameters> coefficients;
+    Coefficients coefficients;
     std::vector<double> covariance;  ///< lower triangle, row by row; NaN: not determined
     std::vector<std::pair<std::string, double>> noise;  ///< name with unit, value
     std::vector<Instrument> instruments;
@@ -77,7 +85,7 @@ struct Entry {
 [[nodiscard]] Entry read_entry(const std::string& folder);
 /// The same but for its files and their hash.
 [[nodiscard]] Entry read_recorded(const std::string& folder);
-/// The result's part of it.
-void take_result(const std::string& result_json, Entry& to);
+/// The result's part of it. `frequency_hz`: of the configuration, where the result says no other.
+void take_result(const std::string& result_json, double frequency_hz, Entry& to);
 
 }  // namespace vibrig::archive

@@ -140,20 +140,25 @@ void Index::take_coefficients(const Filter& filter, std::map<std::string, Entry*
     std::string key;
     int position = 0;
     Coefficient c;
+    double at_hz = 0;
+    soci::indicator noted = soci::i_null;
     where.bind(ask);
     ask.exchange(into(key));
     ask.exchange(into(position));
     for (auto* number : {&c.value, &c.sigma, &c.u_a, &c.u, &c.expanded})
         ask.exchange(into(*number));
+    ask.exchange(into(at_hz, noted));
     prepare(ask,
-            "SELECT k.campaign, k.position, k.value, k.sigma, k.u_a, k.u, k.expanded FROM result r "
-            "JOIN campaign c ON c.key = r.campaign JOIN coefficient k ON k.campaign = r.campaign" +
+            "SELECT k.campaign, k.position, k.value, k.sigma, k.u_a, k.u, k.expanded, k.at_hz FROM "
+            "result r JOIN campaign c ON c.key = r.campaign JOIN coefficient k ON k.campaign = "
+            "r.campaign" +
                 where.text());
     while (ask.fetch()) {
         const auto of = by_key.find(key);
         if (of == by_key.end() || position < 0 ||
             static_cast<std::size_t>(position) >= estimator::kParameters)
             continue;
+        c.at_hz = noted == soci::i_ok ? std::optional(at_hz) : std::nullopt;
         of->second->coefficients[static_cast<std::size_t>(position)] = c;
     }
 }

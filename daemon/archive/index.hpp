@@ -36,6 +36,8 @@ class Index {
     /// those that the recorder noted stay.
     void put(const Entry& entry, bool files);
     void forget(const std::string& key);
+    /// Of which vibration its quadratic coefficients are, where that is not noted yet.
+    void note_vibration(const Entry& entry);
     /// The key of the campaign with this hash.
     [[nodiscard]] std::optional<std::string> key_of(const std::string& hash);
     /// Keys of the same rig's campaigns that began and ended when this one did, with other files:

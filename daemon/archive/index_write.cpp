@@ -81,11 +81,14 @@ void Index::put_rows(const Entry& entry) {
     int position = 0;
     std::string name;
     Coefficient c;
+    double at_hz = 0;
+    soci::indicator noted = soci::i_null;
     soci::statement insert =
         (sql.prepare << "INSERT INTO coefficient (campaign, position, name, value, sigma, u_a, u, "
-                        "expanded) VALUES (:key, :position, :name, :value, :sigma, :ua, :u, :big)",
+                        "expanded, at_hz) VALUES (:key, :position, :name, :value, :sigma, :ua, :u, "
+                        ":big, :hz)",
          use(entry.key), use(position), use(name), use(c.value), use(c.sigma), use(c.u_a), use(c.u),
-         use(c.expanded));
+         use(c.expanded), use(at_hz, noted));
     bool any = false;
     for (std::size_t i = 0; i < entry.coefficients.size(); ++i) {
         if (!entry.coefficients[i]) continue;
@@ -93,6 +96,8 @@ void Index::put_rows(const Entry& entry) {
         position = static_cast<int>(i);
         name = estimator::parameter_names()[i];
         c = *entry.coefficients[i];
+        at_hz = c.at_hz.value_or(0);
+        noted = c.at_hz ? soci::i_ok : soci::i_null;
         insert.execute(true);
     }
     if (any && !entry.covariance.empty()) {
@@ -114,6 +119,21 @@ void Index::put_rows(const Entry& entry) {
         sql << "INSERT INTO temperature (campaign, sensor, mean_c, low_c, high_c) VALUES (:key, "
                ":sensor, :mean, :low, :high)",
             use(entry.key), use(of.sensor), use(of.mean), use(of.low), use(of.high);
+}
+
+void Index::note_vibration(const Entry& entry) {
+    database_.guarded([&] {
+        Change change(database_.sql());
+        for (std::size_t i = 0; i < entry.coefficients.size(); ++i) {
+            const auto& c = entry.coefficients[i];
+            if (!c || !c->at_hz) continue;
+            const int position = static_cast<int>(i);
+            database_.sql() << "UPDATE coefficient SET at_hz = :hz WHERE campaign = :key AND "
+                               "position = :position AND at_hz IS NULL",
+                use(*c->at_hz), use(entry.key), use(position);
+        }
+        change.commit();
+    });
 }
 
 void Index::forget(const std::string& key) {

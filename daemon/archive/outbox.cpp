@@ -70,6 +70,12 @@ std::string refusal_in(const std::string& line) {
     return found != root.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
+/// Which of the earlier campaigns say nothing of quadratic coefficients; empty: none.
+std::string left_out_in(const nlohmann::json& delivered) {
+    const int count = delivered.value("of_other_vibration", 0);
+    return count > 0 ? fmt::format("; quadratic ones without {} of another vibration", count) : "";
+}
+
 /// Its turn comes when nobody else wants processor or disk; its children inherit that.
 void be_last() {
     const auto self = static_cast<id_t>(::syscall(SYS_gettid));
@@ -320,15 +326,20 @@ void Outbox::tell_moved(const std::string& line) {
             event_(Severity::alarm,
                    fmt::format("unit {} has moved by more than its {} earlier campaigns allow: {}",
                                root.at("unit").get<std::string>(), root.at("earlier").get<int>(),
-                               words));
+                               words + left_out_in(root)));
     } catch (const nlohmann::json::exception&) {  // of another version of vibrig
     }
+}
+
+void Outbox::add_unit(std::vector<std::string>& words) const {
+    if (unit_.simulated) words.emplace_back("--simulated");
+    if (unit_.at_hz > 0) words.insert(words.end(), {"--at-hz", fmt::format("{}", unit_.at_hz)});
 }
 
 void Outbox::ask_history() {
     if (unit_.serial.empty()) return;
     std::vector<std::string> words{"trend", unit_.serial};
-    if (unit_.simulated) words.emplace_back("--simulated");
+    add_unit(words);
     const Run run = run_child(command(std::move(words)), kPatience_s, stop_);
     if (run.status != 0) return;  // a new unit, or an archive that does not answer
     if (!unit_.simulated && run.out.starts_with("SIMULATED")) return;  // no history of a real one
@@ -340,7 +351,7 @@ void Outbox::ask_type() {
     if (unit_.type.empty() || stop_.load()) return;
     std::vector<std::string> words{"archive", "type", unit_.type};
     if (!unit_.serial.empty()) words.insert(words.end(), {"--without", unit_.serial});
-    if (unit_.simulated) words.emplace_back("--simulated");
+    add_unit(words);
     const Run run = run_child(command(std::move(words)), kPatience_s, stop_);
     const std::lock_guard lock(mutex_);
     // What is known stays known while the archive does not answer.

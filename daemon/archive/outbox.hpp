@@ -29,6 +29,7 @@ class Outbox {
         std::string serial;  ///< empty: not known
         std::string type;    ///< empty: nothing is asked of its type
         bool simulated = false;
+        double at_hz = 0;  ///< of which its campaign's quadratic coefficients will be; 0: not known
     };
     /// `recordings`: the folder of campaigns' folders. `event` is called in its thread.
     Outbox(configuration::ArchiveSettings settings, std::string recordings, Unit unit,
@@ -69,6 +70,8 @@ class Outbox {
     bool put_aside(const Campaign& campaign, const std::string& why);
     void tell_moved(const std::string& line);
     void ask_history();
+    /// To the words of a command: on which rig the unit is, and of which vibration.
+    void add_unit(std::vector<std::string>& words) const;
     void ask_type();
     void make_room(const std::vector<Campaign>& campaigns);
     void wait(double seconds);

@@ -40,10 +40,15 @@ const std::vector<std::string> kManyCampaigns{
     "CREATE INDEX instrument_campaign ON instrument (campaign)",
     "CREATE INDEX campaign_started ON campaign (started_utc_ns)"};
 
+/// NULL: noted before there was this column, or a linear one's.
+const std::vector<std::string> kVibration{
+    "ALTER TABLE coefficient ADD COLUMN at_hz DOUBLE PRECISION"};
+
 }  // namespace
 
 const std::vector<std::vector<std::string>>& migrations() {
-    static const std::vector<std::vector<std::string>> all{kRecordings, kResults, kManyCampaigns};
+    static const std::vector<std::vector<std::string>> all{kRecordings, kResults, kManyCampaigns,
+                                                           kVibration};
     return all;
 }
 

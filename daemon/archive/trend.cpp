@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "daemon/archive/vibration.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 
 namespace vibrig::archive {
@@ -148,9 +149,38 @@ void name_outliers(Trend& trend) {
     }
 }
 
+/// One coefficient of all campaigns, without what is of another vibration: those campaigns are
+/// `others`, by their places.
+CoefficientTrend points_of(std::size_t position, const Coefficients& like, Trend& trend,
+                           std::set<std::size_t>& others) {
+    CoefficientTrend of;
+    of.position = position;
+    const Coefficient* reference = like[position] ? &*like[position] : nullptr;
+    for (auto one = trend.campaigns.rbegin(); one != trend.campaigns.rend() && !reference; ++one)
+        if (one->coefficients[position]) reference = &*one->coefficients[position];
+    if (reference == nullptr) return of;
+    of.at_hz = reference->at_hz;
+    if (is_quadratic(position)) trend.vibrations.insert(vibration_text(of.at_hz));
+    for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
+        const auto& c = trend.campaigns[i].coefficients[position];
+        // What one rig has wrong it has wrong each time: between its campaigns only noise
+        // differs.
+        const double own = c ? (trend.several_rigs ? c->u : c->u_a) : 0;
+        if (!(own > 0)) continue;
+        if (same_vibration(c->at_hz, of.at_hz)) {
+            of.points.push_back({i, *c, own, kNotKnown, 1, false});
+            continue;
+        }
+        others.insert(i);
+        trend.other_vibrations.insert(vibration_text(c->at_hz));
+    }
+    return of;
+}
+
 }  // namespace
 
-Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated) {
+Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated,
+               const Coefficients& like) {
     Trend trend;
     trend.simulated = simulated;
     trend.elsewhere = std::erase_if(
@@ -172,23 +202,17 @@ Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simul
         }
         trend.turn.push_back(turn);
     }
+    std::set<std::size_t> others;
     for (std::size_t position = 0; position < estimator::kParameters; ++position) {
-        CoefficientTrend of;
-        of.position = position;
+        CoefficientTrend of = points_of(position, like, trend, others);
+        if (of.points.empty()) continue;
         std::vector<double> value, u;
         std::vector<std::size_t> group;
-        for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
-            const auto& c = trend.campaigns[i].coefficients[position];
-            // What one rig has wrong it has wrong each time: between its campaigns only noise
-            // differs.
-            const double own = c ? (trend.several_rigs ? c->u : c->u_a) : 0;
-            if (!(own > 0)) continue;
-            of.points.push_back({i, *c, own, kNotKnown, 1, false});
-            value.push_back(c->value);
-            u.push_back(own);
-            group.push_back(trend.turn[i]);
+        for (const TrendPoint& point : of.points) {
+            value.push_back(point.of.value);
+            u.push_back(point.u);
+            group.push_back(trend.turn[point.campaign]);
         }
-        if (of.points.empty()) continue;
         const Variance found = analyse_variance(value, u, group);
         of.operating = found.within;
         of.shutdown = found.between;
@@ -201,6 +225,7 @@ Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simul
         of.mean_high = of.mean + half;
         trend.coefficients.push_back(std::move(of));
     }
+    trend.of_other_vibration = others.size();
     name_outliers(trend);
     return trend;
 }
@@ -223,7 +248,7 @@ std::vector<Moved> moved(const Entry& campaign, const std::vector<Entry>& histor
         std::vector<double> before, before_u;
         for (const Entry* one : earlier) {
             const auto& c = one->coefficients[position];
-            if (!c || !(u_of(*c) > 0)) continue;
+            if (!c || !(u_of(*c) > 0) || !same_vibration(c->at_hz, now->at_hz)) continue;
             before.push_back(c->value);
             before_u.push_back(u_of(*c));
         }

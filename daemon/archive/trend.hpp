@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "daemon/archive/entry.hpp"
@@ -32,24 +34,32 @@ struct TrendPoint {
 };
 
 struct CoefficientTrend {
-    std::size_t position = 0;  ///< in parameter_names()
+    std::size_t position = 0;     ///< in parameter_names()
+    std::optional<double> at_hz;  ///< Coefficient::at_hz of all points
     std::vector<TrendPoint> points;
     double mean = 0, mean_low = 0, mean_high = 0;  ///< 95 %
     Instability operating, shutdown;
 };
 
 struct Trend {
-    std::vector<Entry> campaigns;                ///< by time, "not valid" ones left out
-    std::vector<std::size_t> turn;               ///< of each campaign: in which turn-on, from 0
-    std::size_t left_out = 0;                    ///< not valid, or without a result
-    bool simulated = false;                      ///< on simulated rigs, or on real ones
-    std::size_t elsewhere = 0;                   ///< left out: on the other ones
+    std::vector<Entry> campaigns;   ///< by time, "not valid" ones left out
+    std::vector<std::size_t> turn;  ///< of each campaign: in which turn-on, from 0
+    std::size_t left_out = 0;       ///< not valid, or without a result
+    bool simulated = false;         ///< on simulated rigs, or on real ones
+    std::size_t elsewhere = 0;      ///< left out: on the other ones
+    /// Of which vibration quadratic coefficients are compared, in words; of which others there are,
+    /// and of how many campaigns quadratic ones are left out for that.
+    std::set<std::string> vibrations, other_vibrations;
+    std::size_t of_other_vibration = 0;
     std::vector<CoefficientTrend> coefficients;  ///< those with points
     bool several_rigs = false;
 };
 
 /// Trend of one unit's campaigns, by time: those on simulated rigs, or those on real ones.
-[[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated);
+/// Quadratic coefficients depend on the vibration: compared are those of the same as `like` has,
+/// and where it has none, as the newest campaign that determines them.
+[[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated,
+                             const Coefficients& like = {});
 
 /// Analysis of variance of values with known standard uncertainties in groups: within the groups
 /// against the uncertainties, and between the groups against within (or the uncertainties, where no
@@ -79,6 +89,7 @@ struct Moved {
     Judgement by;
 };
 /// At 1 in 1000 campaigns, all coefficients together; `history`: the same unit's, earlier.
+/// Quadratic ones against those of the same vibration.
 [[nodiscard]] std::vector<Moved> moved(const Entry& campaign, const std::vector<Entry>& history);
 
 }  // namespace vibrig::archive

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "daemon/archive/vibration.hpp"
+
 namespace vibrig::archive {
 
 namespace {
@@ -45,7 +47,7 @@ Found found_of(const Entry& one, bool several_rigs) {
 }  // namespace
 
 TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& without,
-                      bool simulated) {
+                      bool simulated, const Coefficients& like) {
     TypeCampaigns out;
     std::vector<const Entry*> kept;
     for (const Entry& one : campaigns) {
@@ -57,6 +59,13 @@ TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& wi
         }
         kept.push_back(&one);
     }
+    const bool asked = std::ranges::any_of(like, [](const auto& c) { return c.has_value(); });
+    if (asked || !kept.empty()) {
+        const Coefficients& of = asked ? like : kept.back()->coefficients;
+        out.vibration = vibrations_in(of);
+        out.of_other_vibration = std::erase_if(
+            kept, [&of](const Entry* one) { return !same_vibration(of, one->coefficients); });
+    }
     const bool several_rigs =
         std::ranges::any_of(kept, [&](const Entry* one) { return one->rig != kept.front()->rig; });
     std::map<std::string, std::vector<Found>> units;
@@ -67,14 +76,17 @@ TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& wi
 }
 
 TypeCampaigns campaigns_of_type(Index& index, const std::string& type, const std::string& without,
-                                bool simulated) {
+                                bool simulated, const Coefficients& like,
+                                const std::string& folder) {
     Filter filter;
     filter.type = type;
     filter.newest = kNewestOfType;
     const auto newest = index.campaigns(filter);
     if (newest.empty()) return {};
     filter.since_utc_ns = newest.front().started_utc_ns;
-    return by_unit(index.results(filter, true), without, simulated);
+    auto found = index.results(filter, true);
+    read_vibrations(index, folder, found);
+    return by_unit(found, without, simulated, like);
 }
 
 }  // namespace vibrig::archive

@@ -16,12 +16,16 @@ inline constexpr std::size_t kNewestOfType = 2000;
 struct TypeCampaigns {
     std::vector<std::vector<estimator::uncertainty::Found>> units;
     std::size_t campaigns = 0, left_out = 0;
+    std::string vibration;               ///< of which the quadratic coefficients are, in words
+    std::size_t of_other_vibration = 0;  ///< left out for that
 };
 
-/// `without`: this unit's are no evidence about itself.
+/// `without`: this unit's are no evidence about itself. Campaigns of one vibration: of the same as
+/// `like` has, and where it has none, as the newest.
 [[nodiscard]] TypeCampaigns campaigns_of_type(Index& index, const std::string& type,
-                                              const std::string& without, bool simulated);
+                                              const std::string& without, bool simulated,
+                                              const Coefficients& like, const std::string& folder);
 [[nodiscard]] TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& without,
-                                    bool simulated);
+                                    bool simulated, const Coefficients& like = {});
 
 }  // namespace vibrig::archive

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "daemon/archive/manifest.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
@@ -37,6 +38,9 @@ void add_coefficients(const Entry& of, Cells& to) {
                                             {"expanded", c.expanded}})
             to[fmt::format("coefficient.{} of {}", column, estimator::parameter_names()[i])] =
                 number_text(value);
+        if (c.at_hz)
+            to[fmt::format("coefficient.at_hz of {}", estimator::parameter_names()[i])] =
+                number_text(*c.at_hz);
     }
     // Without a coefficient the index keeps none.
     if (to.empty()) return;
@@ -84,6 +88,12 @@ Cells cells_of(const Entry& of) {
     return cells;
 }
 
+/// What is not noted of one is not of the other.
+void forget_vibration(const Coefficients& not_noted, Coefficients& of) {
+    for (std::size_t i = 0; i < of.size(); ++i)
+        if (of[i] && not_noted[i] && !not_noted[i]->at_hz) of[i]->at_hz.reset();
+}
+
 /// The index's rows against what the recording's own files say.
 void check_rows(const Entry& indexed, const fs::path& folder, const std::string& index,
                 Verified& to) {
@@ -98,7 +108,16 @@ void check_rows(const Entry& indexed, const fs::path& folder, const std::string&
     if (const std::string rig = origin_in(folder.string()).rig; !rig.empty() && rig != indexed.rig)
         differs("result.rig", indexed.rig, rig, folder / kManifestName);
     try {
-        const Cells is = cells_of(read_recorded(folder.string())), was = cells_of(indexed);
+        Entry recorded = read_recorded(folder.string());
+        // Of an index that is older than that column: one thing to do, not a difference of each.
+        if (!vibration_noted(indexed.coefficients)) {
+            to.findings.push_back({"not in the index", indexed.key,
+                                   "of which vibration its quadratic coefficients are is not "
+                                   "noted: vibrig archive add " +
+                                       folder.string()});
+            forget_vibration(indexed.coefficients, recorded.coefficients);
+        }
+        const Cells is = cells_of(recorded), was = cells_of(indexed);
         const auto text_in = [](const Cells& cells, const std::string& column) {
             const auto found = cells.find(column);
             return found == cells.end() ? "nothing" : '"' + record::shown(found->second) + '"';

@@ -73,6 +73,8 @@ std::string to_json(const TypePrior& prior) {
                                         {"simulated", prior.simulated},
                                         {"units", of.units},
                                         {"campaigns", of.campaigns},
+                                        {"vibration", prior.vibration},
+                                        {"of_other_vibration", prior.of_other_vibration},
                                         {"coefficients", std::move(coefficients)},
                                         {"covariance_between_units", lower_triangle(of.between)},
                                         {"covariance_between_campaigns", lower_triangle(of.within)},

@@ -14,6 +14,8 @@ struct TypePrior {
     std::string type;
     bool simulated = false;  ///< from campaigns on simulated rigs
     estimator::uncertainty::Population of;
+    std::string vibration;               ///< of which the quadratic coefficients are, in words
+    std::size_t of_other_vibration = 0;  ///< campaigns that were left out for that
 };
 
 /// As `vibrig archive type --json` prints it: one line.

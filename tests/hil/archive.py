@@ -136,6 +136,36 @@ def moves(checks, rig, lab, base):
     checks.equal(len(glob.glob(os.path.join(rig.folder, "trend", "*.svg"))), 31, "and draws a chart of each")
 
 
+def at_another_frequency(checks, rig, lab, base):
+    """A campaign of that unit at another frequency, and an index of before it knew of which vibration a coefficient is."""
+    def trend(*words):
+        run = lab.run("trend", "0018", "--json", *words)
+        found = json.loads(run.stdout or '{"coefficients": []}')
+        return found, {c["name"]: len(c["points"]) for c in found["coefficients"]}
+    before, points = trend()
+    other = clone(base, os.path.join(rig.folder, "faster"), -60, serial="0018", shift=-400)
+    with h5py.File(os.path.join(other, "campaign.h5"), "r+") as file:
+        text = next(line for line in file["configuration"][()].decode().splitlines() if line.startswith("vibration.frequency_hz"))
+        r.reconfigure(file, text, "vibration.frequency_hz = 33.0")
+    run = lab.add(other, "rig-7")
+    found, now = trend()
+    checks.check(run.returncode == 0 and before["of_other_vibration"] == 0 and found["of_other_vibration"] == 1 and
+                 "those of 1 campaigns of another vibration (at 33 Hz) left out" in found["vibration"] and
+                 all(now[name] - points[name] == (len(name) < 5) for name in points) and any(len(name) == 5 for name in points),
+                 "at another frequency its quadratic coefficients are left out of the trend, and that is said", run.stderr + str(found)[:500])
+    checks.check(found["vibration"] in lab.run("trend", "0018").stdout, "in the table, too")
+    checks.equal({len(c["points"]) for c in trend("--at-hz", "33")[0]["coefficients"] if c["unit"] == "deg/h/g^2"}, {1},
+                 "asked for, they are there")
+    with contextlib.closing(sqlite3.connect(os.path.join(lab.folder, "recordings.sqlite3"))) as index:
+        index.execute("UPDATE coefficient SET at_hz = NULL")
+        index.commit()
+        checks.equal({f["what"] for f in lab.verify()}, {"not in the index"}, "an index that does not know it is no wrong one")
+        checks.equal(trend()[0]["vibration"], found["vibration"], "a trend reads it from the recordings")
+        known = index.execute("SELECT count(*) FROM coefficient k JOIN result r USING (campaign) WHERE r.unit_serial = '0018' AND at_hz = 33")
+        checks.check(known.fetchone()[0] > 0, "and notes it")
+    checks.equal((lab.run("archive", "add", lab.folder).returncode, lab.verify()), (0, []), "and archive add of the archive notes all of them")
+
+
 def browsed(checks, lab, folder):
     """As a browser shows it; the door picks its port."""
     server = r.Child("serve", [lab.program, "archive", "serve", *lab.where(), "--page", "127.0.0.1:0", "--json"], folder)
@@ -598,6 +628,7 @@ def main():
         base = glob.glob(os.path.join(rig.results, "unit-*"))[0]
         small = clone(base, os.path.join(folder, "small"), 0)
         moves(checks, rig, lab, base)
+        at_another_frequency(checks, rig, lab, base)
         adaptive_by_type(checks, rig, lab, base, seed)
         rig.daemon.end()
         rig.plant.end()

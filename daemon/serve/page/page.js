@@ -183,7 +183,7 @@
       earlier = Object.fromEntries(unit.coefficients.map(c => [c.name, c]));
       const last = unit.campaigns.at(-1), note = byId('earlier-note');
       note.hidden = !last;
-      if (last) note.textContent = `Below each: unit ${unit.unit.serial} before, mean of ${unit.campaigns.length} campaigns with its 95 % interval; the newest ${last.started}, ${last.verdict || 'without a verdict'}.`;
+      if (last) note.textContent = `Below each: unit ${unit.unit.serial} before, mean of ${unit.campaigns.length} campaigns with its 95 % interval; the newest ${last.started}, ${last.verdict || 'without a verdict'}${unit.vibration ? `; ${unit.vibration}` : ''}.`;
     } catch { seenDelivered = undefined; }   // asked again with the next status
   }
   let seenDwells = null, classical = [new Map(), new Map(), new Map()];

@@ -5,6 +5,7 @@
 #include "daemon/archive/outbox.hpp"
 #include "daemon/archive/trend.hpp"
 #include "daemon/archive/verify.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/results/json_values.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
@@ -35,8 +36,10 @@ Json moved_json(const std::vector<archive::Moved>& moved) {
 
 /// What a delivery did, one line of JSON for vibrigd, one of text for people.
 void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
-                   const std::vector<archive::Moved>& moved, std::size_t history, bool json) {
+                   const std::vector<archive::Entry>& history, bool json) {
     const auto& entry = delivery.entry;
+    const auto moved = archive::moved(entry, history);
+    const auto others = archive::count_of_other_vibrations(entry.coefficients, history);
     constexpr std::array<const char*, 3> kDone{"copied", "was there", "mended"};
     const char* const done = kDone[static_cast<std::size_t>(delivery.kind)];
     if (json) {
@@ -47,7 +50,8 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
                                            {"hash", entry.hash},
                                            {"unit", entry.unit_serial},
                                            {"verdict", entry.verdict},
-                                           {"earlier", history},
+                                           {"earlier", history.size()},
+                                           {"of_other_vibration", others},
                                            {"moved", moved_json(moved)}})
                   << '\n';
     } else {
@@ -60,7 +64,11 @@ void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
         for (const auto& one : moved)
             std::cout << "  " << estimator::parameter_names()[one.position] << " is " << one.value
                       << ", " << one.by.expected << " +- " << one.by.sigma << " by this unit's "
-                      << history << " earlier campaigns\n";
+                      << history.size() << " earlier campaigns"
+                      << (others > 0 ? ", quadratic ones without those of " +
+                                           std::to_string(others) + " of another vibration"
+                                     : "")
+                      << '\n';
     }
     std::cout << std::flush;
 }
@@ -111,16 +119,16 @@ int add(const AddOptions& o) {
                     archive::Filter filter;
                     filter.serial = delivery.entry.unit_serial;
                     filter.until_utc_ns = delivery.entry.started_utc_ns;
-                    history = archive::Index(at.place.index, archive::Database::Mode::read)
-                                  .results(filter);
+                    archive::Index index(at.place.index, archive::Database::Mode::write);
+                    history = index.results(filter);
                     std::erase_if(history, [&](const archive::Entry& one) {
                         return one.simulated != delivery.entry.simulated;
                     });
+                    archive::read_vibrations(index, at.place.folder, history);
                 }
                 // Archived as it is, so that vibrigd does not try for ever.
                 static_cast<void>(tell_missing_raw(folder));
-                tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
-                              history.size(), o.json);
+                tell_delivery(delivery, folder, history, o.json);
                 no_longer_refused(folder, at.place.folder);
             } catch (const std::exception& error) {
                 // vibrigd tells it from a failure by this line.

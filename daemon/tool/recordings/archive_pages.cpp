@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/archive/trend.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/plot/xml_text.hpp"
 #include "daemon/results/text_line.hpp"
 #include "daemon/serve/api.hpp"
@@ -159,6 +160,7 @@ std::string ArchivePages::front(archive::Index& index) const {
 std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) const {
     const std::string& serial = campaigns.front().unit_serial;
     const auto trend = unit_trend(campaigns);
+    const std::string words = vibration_words(trend);
     std::string rows, charts, outliers;
     for (const auto& of : trend.coefficients) {
         const std::string name = estimator::parameter_names()[of.position];
@@ -189,6 +191,7 @@ std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) con
             (trend.elsewhere > 0
                  ? " " + std::to_string(trend.elsewhere) + " campaigns on simulated rigs left out."
                  : "") +
+            (words.empty() ? "" : " <span id=\"vibration\">Q" + words.substr(1) + ".</span>") +
             "</p><div class=\"scroll\"><table "
             "id=\"trend\"><thead><tr><th></th><th class=\"number\">mean</th><th "
             "class=\"number\">95 %</th><th class=\"number\">operating instability</th><th "
@@ -207,7 +210,9 @@ std::string ArchivePages::campaign(archive::Index& index, const archive::Entry& 
                     "</th><td class=\"number\">" + printed("%.6f", c->value) +
                     "</td><td class=\"number\">" + printed("%.6f", c->u) +
                     "</td><td class=\"number\">" + printed("%.6f", c->expanded) + "</td><td>" +
-                    estimator::parameter_unit(i) + "</td></tr>";
+                    estimator::parameter_unit(i) +
+                    (archive::is_quadratic(i) ? " " + archive::vibration_text(c->at_hz) : "") +
+                    "</td></tr>";
     auto all = index.files(entry.key);
     if (fs::exists(fs::path(place_.folder) / entry.key / "report.html"))
         all.push_back({"report.html", 0, ""});

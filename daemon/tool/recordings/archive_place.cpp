@@ -12,6 +12,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -54,6 +55,13 @@ void add_archive_options(CLI::App& command, ArchiveOptions& options) {
                        "its index, postgresql://... (default: $VIBRIG_ARCHIVE_INDEX, else "
                        "recordings.sqlite3 in the folder)");
     command.add_option("--config", options.config, "vibrigd's configuration, which has [archive]");
+}
+
+void add_at_hz(CLI::App& command, std::optional<double>& at_hz) {
+    add_number(command, "--at-hz", at_hz,
+               "quadratic coefficients of campaigns at this frequency, 0: static ones (default: of "
+               "the same vibration as the newest's), Hz",
+               0, 1e5);
 }
 
 Whereabouts whereabouts_of(const ArchiveOptions& options) {

@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/archive/deliver.hpp"
@@ -17,6 +18,8 @@ struct ArchiveOptions {
 
 /// --archive, --index and --config.
 void add_archive_options(CLI::App& command, ArchiveOptions& options);
+/// --at-hz: of which vibration quadratic coefficients are compared.
+void add_at_hz(CLI::App& command, std::optional<double>& at_hz);
 
 struct Whereabouts {
     archive::Place place;

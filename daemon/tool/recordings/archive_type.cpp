@@ -2,8 +2,10 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <optional>
 
 #include "daemon/archive/type_statistics.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/plan/type_prior.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
@@ -16,14 +18,19 @@ namespace {
 
 struct TypeOptions {
     std::string type, without;
+    std::optional<double> at_hz;
     bool simulated = false, json = false;
     ArchiveOptions where = {};
 };
 
 void print(const plan::TypePrior& prior) {
     const auto& of = prior.of;
-    std::printf("type %s: %zu units, %zu campaigns%s\n\n", prior.type.c_str(), of.units,
-                of.campaigns, prior.simulated ? " on simulated rigs" : "");
+    std::printf("type %s: %zu units, %zu campaigns%s\nquadratic coefficients: %s",
+                prior.type.c_str(), of.units, of.campaigns,
+                prior.simulated ? " on simulated rigs" : "", prior.vibration.c_str());
+    if (prior.of_other_vibration > 0)
+        std::printf("; %zu campaigns of another vibration left out", prior.of_other_vibration);
+    std::printf("\n\n");
     std::printf("%-11s %12s %14s %18s %15s\n", "coefficient", "mean", "between units",
                 "between campaigns", "of another unit");
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
@@ -37,17 +44,24 @@ void print(const plan::TypePrior& prior) {
 
 int type_statistics(const TypeOptions& o) {
     const auto index = open_index(o.where);
-    const auto found = archive::campaigns_of_type(*index, o.type, o.without, o.simulated);
+    const auto found =
+        archive::campaigns_of_type(*index, o.type, o.without, o.simulated, archive::all_at(o.at_hz),
+                                   whereabouts_of(o.where).place.folder);
     if (found.units.size() < estimator::uncertainty::kFewestUnits) {
         std::cerr << index->name() << ": found " << found.units.size() << " units of type '"
                   << proto::printable(o.type) << "' with " << found.campaigns << " campaigns on "
                   << (o.simulated ? "simulated" : "real") << " rigs (" << found.left_out
-                  << " not valid or not whole left out), expected at least "
-                  << estimator::uncertainty::kFewestUnits << " units\n";
+                  << " not valid or not whole left out"
+                  << (found.of_other_vibration > 0
+                          ? ", " + std::to_string(found.of_other_vibration) + " not " +
+                                found.vibration + " left out"
+                          : "")
+                  << "), expected at least " << estimator::uncertainty::kFewestUnits << " units\n";
         return kNo;
     }
     const plan::TypePrior prior{o.type, o.simulated,
-                                estimator::uncertainty::population_of(found.units)};
+                                estimator::uncertainty::population_of(found.units), found.vibration,
+                                found.of_other_vibration};
     if (o.json) {
         std::cout << plan::to_json(prior) << '\n';
     } else {
@@ -66,6 +80,7 @@ void add_archive_type(CLI::App& group, int& exit_code) {
     command.add_option("--without", options.without,
                        "leave out the unit with this serial number, of which something is to be "
                        "predicted");
+    add_at_hz(command, options.at_hz);
     command.add_flag("--simulated", options.simulated,
                      "of campaigns on simulated rigs (default: on real ones)");
     command.add_flag("--json", options.json, "print it as JSON, with covariances");

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/archive/trend.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/shaken.hpp"
@@ -27,6 +28,7 @@
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/tool/recordings/replayed_result.hpp"
+#include "daemon/tool/recordings/trend_output.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "proto/durable_file.hpp"
 #include "proto/json_text.hpp"
@@ -68,17 +70,21 @@ void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
     filter.serial = serial;
     filter.until_utc_ns = campaign.head.utc_ns;
     auto index = open_index(where);
-    const auto before = index->results(filter);
+    auto before = index->results(filter);
+    archive::read_vibrations(*index, whereabouts_of(where).place.folder, before);
     archive::Entry now;
     now.simulated = campaign.head.simulated;
     now.started_utc_ns = campaign.head.utc_ns;
     now.rig = before.empty() ? "" : before.back().rig;
-    archive::take_result(campaign.result_json, now);
+    archive::take_result(campaign.result_json,
+                         report::configuration_of(campaign).estimator.frequency_hz, now);
     const auto moved = archive::moved(now, before);
-    const auto trend = archive::trend_of(before, archive::kShutdownAfterH, now.simulated);
+    const auto trend =
+        archive::trend_of(before, archive::kShutdownAfterH, now.simulated, now.coefficients);
+    const std::string vibration = vibration_words(trend);
     analysis.history_note =
         "Unit " + serial + ": " + std::to_string(trend.campaigns.size()) +
-        " earlier campaigns in the archive." +
+        " earlier campaigns in the archive" + (vibration.empty() ? "" : "; " + vibration) + "." +
         (moved.empty() ? "" : " What is marked has moved by more than they allow, at 1 in 1000.");
     analysis.history = {
         {"coefficient", "now", "mean before", "95 %", "shutdown instability", "unit"}};

@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "daemon/archive/trend.hpp"
+#include "daemon/archive/vibration.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
@@ -17,6 +19,7 @@ namespace {
 struct TrendOptions {
     std::string serial, since, plot;
     double shutdown_after_h = archive::kShutdownAfterH;
+    std::optional<double> at_hz;
     bool simulated = false, json = false;
     ArchiveOptions where = {};
 };
@@ -52,10 +55,12 @@ int trend(const TrendOptions& o) {
                                      minute_text(before.back().started_utc_ns));
     }
     if (campaigns.empty()) unknown_unit(*index, o.serial);
+    archive::read_vibrations(*index, whereabouts_of(o.where).place.folder, campaigns);
     // Simulated ones are no history of a unit that was on a real rig.
     const bool simulated =
         o.simulated || std::ranges::all_of(campaigns, &archive::Entry::simulated);
-    const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h, simulated);
+    const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h, simulated,
+                                         archive::all_at(o.at_hz));
     if (found.campaigns.empty() && found.left_out == 0)
         throw std::runtime_error(index->name() + ": found " + std::to_string(found.elsewhere) +
                                  " campaigns of unit '" + proto::printable(o.serial) +
@@ -84,6 +89,7 @@ void add_trend(CLI::App& app, int& exit_code) {
     add_number(command, "--shutdown-after", options.shutdown_after_h,
                "a longer pause between two campaigns counts as a shutdown, h", 0, 1e6)
         ->capture_default_str();
+    add_at_hz(command, options.at_hz);
     command.add_flag("--simulated", options.simulated,
                      "of campaigns on simulated rigs (default: on real ones, where there are any)");
     command.add_flag("--json", options.json, "print it as JSON");
@@ -98,6 +104,7 @@ void add_trend(CLI::App& app, int& exit_code) {
         "uncertainty explains (F against it); shutdown instability: between turn-ons (F against "
         "the\n"
         "scatter within). Outliers: what the other campaigns allow once in 1000 such histories.\n"
+        "Quadratic coefficients depend on the vibration: those of others are left out.\n"
         "Exit codes: 0, 2 bad usage or input.");
 }
 

@@ -38,6 +38,11 @@ double days_of(const archive::Trend& trend, const archive::TrendPoint& point) {
            kDay_ns;
 }
 
+/// Null: a linear one's, or of no single frequency, or not noted; `vibration` says which.
+Json at_hz_json(const std::optional<double>& at_hz) {
+    return at_hz && *at_hz >= 0 ? Json(*at_hz) : Json(nullptr);
+}
+
 /// In a chart's title.
 std::string mark_of(const archive::Trend& trend) { return trend.simulated ? "SIMULATED: " : ""; }
 
@@ -45,7 +50,23 @@ std::string time_axis(const archive::Trend& trend) {
     return "days since " + iso_text(trend.campaigns.front().started_utc_ns);
 }
 
+std::string joined(const std::set<std::string>& texts) {
+    std::string all;
+    for (const auto& text : texts) all += (all.empty() ? "" : ", ") + text;
+    return all;
+}
+
 }  // namespace
+
+std::string vibration_words(const archive::Trend& trend) {
+    if (trend.vibrations.empty()) return {};
+    std::string words = "quadratic coefficients: " + joined(trend.vibrations);
+    if (trend.of_other_vibration > 0)
+        words += "; those of " + std::to_string(trend.of_other_vibration) +
+                 " campaigns of another vibration (" + joined(trend.other_vibrations) +
+                 ") left out";
+    return words;
+}
 
 Json trend_json(const std::string& serial, const archive::Trend& trend, double shutdown_after_h) {
     Json campaigns = Json::array(), coefficients = Json::array(), outliers = Json::array();
@@ -83,6 +104,7 @@ Json trend_json(const std::string& serial, const archive::Trend& trend, double s
         }
         coefficients.push_back({{"name", name},
                                 {"unit", estimator::parameter_unit(of.position)},
+                                {"at_hz", at_hz_json(of.at_hz)},
                                 {"mean", of.mean},
                                 {"interval", {of.mean_low, of.mean_high}},
                                 {"operating_instability", instability_json(of.operating)},
@@ -96,6 +118,8 @@ Json trend_json(const std::string& serial, const archive::Trend& trend, double s
             {"campaigns", std::move(campaigns)},
             {"left_out", trend.left_out},
             {"on_other_rigs", trend.elsewhere},
+            {"vibration", text_or_null(vibration_words(trend))},
+            {"of_other_vibration", trend.of_other_vibration},
             {"coefficients", std::move(coefficients)},
             {"outliers", std::move(outliers)}};
 }
@@ -112,6 +136,7 @@ std::string trend_table(const std::string& serial, const archive::Trend& trend,
     if (trend.elsewhere > 0)
         text += "; " + std::to_string(trend.elsewhere) +
                 (trend.simulated ? " on real rigs" : " on simulated rigs") + " left out";
+    if (const auto words = vibration_words(trend); !words.empty()) text += "\n" + words;
     text +=
         "\n\ncoefficient        mean   95 % interval             operating     shutdown       "
         "newest"

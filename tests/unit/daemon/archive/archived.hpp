@@ -26,10 +26,11 @@ class Archived : public record::Parts {
     void record_it(drivers::Time first_sample) {
         std::filesystem::remove(folder_ / "campaign.h5");
         record::Head one = head(1);
-        one.configuration = "unit.serial = \"0017\"\n";
+        one.configuration = "unit.serial = \"0017\"\nvibration.frequency_hz = 25.0\n";
         result_ = R"({"verdict":{"word":"valid","sentence":"valid"},"nis":1.1,"parameters":[)"
                   R"({"name":"D_Fx","value":2.5,"sigma":0.1},)"
-                  R"({"name":"second","value":1.5,"sigma":0.2}],"covariance":[[0.01],[0,0.04]]})";
+                  R"({"name":"second","value":1.5,"sigma":0.2},{"name":"D_Ox"},{"name":"D_Sx"},)"
+                  R"({"name":"D_IIx","value":0.5,"sigma":0.1}],"covariance":[[0.01],[0,0.04]]})";
         write(one, first_sample, {1, 2}, 2);
     }
     void add() const { static_cast<void>(deliver(folder_.string(), place(), "rig", {})); }

@@ -13,6 +13,7 @@
 #include "daemon/journal/database.hpp"
 #include "daemon/record/index.hpp"
 #include "tests/unit/daemon/archive/entries.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::archive {
 namespace {
@@ -24,15 +25,6 @@ using ::testing::IsEmpty;
 
 class ArchiveIndex : public ::testing::Test {
   protected:
-    ArchiveIndex() {
-        std::string name = (fs::temp_directory_path() / "vibrig-archive.XXXXXX").string();
-        folder_ = ::mkdtemp(name.data());
-        path_ = index_in(folder_);
-    }
-    ~ArchiveIndex() override {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
     /// As a vibrig of that version left it, with a campaign.
     void make_version(int version) const {
         journal::Database database(path_);
@@ -50,6 +42,9 @@ class ArchiveIndex : public ::testing::Test {
             "ended_utc_ns, simulated, version, compiler, instruction_set, configuration_hash, "
             "verdict, sentence, nis, dwells) VALUES ('old', 'h', 'r', 'T', '17', '', '', 9, 0, "
             "'0', '', '', '', 'valid', '', 1, 28)");
+        database.execute(
+            "INSERT INTO coefficient (campaign, position, name, value, sigma, u_a, u, expanded) "
+            "VALUES ('old', 4, 'D_IIx', 0.5, 0.1, 0.1, 0.2, 0.4)");
     }
     static std::vector<std::string> keys(const std::vector<Entry>& entries) {
         std::vector<std::string> out;
@@ -57,7 +52,8 @@ class ArchiveIndex : public ::testing::Test {
         return out;
     }
 
-    std::string folder_, path_;
+    TemporaryFolder temporary_;
+    const std::string folder_ = temporary_.string(), path_ = index_in(folder_);
 };
 
 TEST_F(ArchiveIndex, ComesFromEachOlderVersionWithWhatItHad) {
@@ -74,6 +70,10 @@ TEST_F(ArchiveIndex, ComesFromEachOlderVersionWithWhatItHad) {
         }
         if (version > 1) {
             EXPECT_EQ(found[0].unit_serial, "17");
+            const auto square = index.results({}).at(0).coefficients[4];
+            ASSERT_TRUE(square);
+            EXPECT_EQ(square->value, 0.5);
+            EXPECT_FALSE(square->at_hz) << "of which vibration it is nobody has noted";
         }
         index.put(entry_of("new", 1), true);
         EXPECT_EQ(index.campaigns({}).size(), found.size() + 1);
@@ -180,6 +180,10 @@ TEST_F(ArchiveIndex, ADamagedOneIsNamedWithWhatMakesItAnew) {
 TEST_F(ArchiveIndex, GivesBackWhatItWasGiven) {
     Entry one = entry_of("17", 1, -1.25e-7, 3e-9);
     one.coefficients[4].reset();
+    one.coefficients[5]->at_hz = 25.5;
+    one.coefficients[6]->at_hz = 0.0;
+    one.coefficients[7]->at_hz = kAtNoFrequency;
+    one.coefficients[8]->at_hz.reset();
     one.covariance.assign(465, 0.5);
     one.covariance[7] = std::numeric_limits<double>::quiet_NaN();
     one.noise = {{"configured angle, arcsec", 5}};
@@ -197,6 +201,11 @@ TEST_F(ArchiveIndex, GivesBackWhatItWasGiven) {
     EXPECT_EQ(found->coefficients[3]->value, -1.25e-7);
     EXPECT_EQ(found->coefficients[3]->u, 3e-9);
     EXPECT_FALSE(found->coefficients[4]);
+    EXPECT_FALSE(found->coefficients[3]->at_hz);
+    EXPECT_EQ(found->coefficients[5]->at_hz, 25.5);
+    EXPECT_EQ(found->coefficients[6]->at_hz, 0.0);
+    EXPECT_EQ(found->coefficients[7]->at_hz, kAtNoFrequency);
+    EXPECT_FALSE(found->coefficients[8]->at_hz);
     ASSERT_EQ(found->covariance.size(), 465U);
     EXPECT_TRUE(std::isnan(found->covariance[7]));
     EXPECT_EQ(found->covariance[8], 0.5);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -123,6 +124,87 @@ TEST(Trend, SimulatedCampaignsAreNoHistoryOfARealUnit) {
     EXPECT_EQ(simulated.left_out, 0U);
     EXPECT_EQ(simulated.elsewhere, 3U);
     EXPECT_NEAR(simulated.coefficients.at(0).mean, 100, 1e-12);
+}
+
+/// A unit that has not changed: quadratic coefficients are 1 at 15 Hz and 4 at 25 Hz, the others 1.
+std::vector<Entry> at_two_frequencies(std::mt19937& random, const std::vector<double>& hz) {
+    std::normal_distribution<double> normal(0, kU);
+    std::vector<Entry> made;
+    for (std::size_t n = 0; n < hz.size(); ++n) {
+        made.push_back(entry_of("1", static_cast<int>(n), 1, kU, hz[n]));
+        for (std::size_t i = 0; i < estimator::kParameters; ++i)
+            made.back().coefficients[i]->value =
+                (hz[n] == 25 && is_quadratic(i) ? 4 : 1) + normal(random);
+    }
+    return made;
+}
+
+bool any_outlier(const Trend& trend) {
+    for (const auto& of : trend.coefficients)
+        if (std::ranges::any_of(of.points, &TrendPoint::outlier)) return true;
+    return false;
+}
+
+TEST(Trend, QuadraticCoefficientsOfAnotherVibrationAreLeftOutAndCounted) {
+    std::mt19937 random(kSeed);
+    // GIVEN 11 campaigns at 15 Hz and 2 at 25 Hz of a unit that is the same all the time
+    auto campaigns =
+        at_two_frequencies(random, {15, 15, 15, 15, 25, 15, 15, 25, 15, 15, 15.005, 15, 15});
+    const auto found = trend_of(campaigns, kShutdownAfterH, false);
+    // THEN linear coefficients are compared over all of them, and nothing is an outlier
+    EXPECT_FALSE(any_outlier(found)) << "seed " << kSeed;
+    ASSERT_EQ(found.coefficients.size(), estimator::kParameters);
+    EXPECT_EQ(found.coefficients[3].points.size(), 13U);
+    EXPECT_EQ(found.coefficients[4].points.size(), 11U);
+    EXPECT_EQ(found.coefficients[4].at_hz, 15.0);
+    EXPECT_NEAR(found.coefficients[4].mean, 1, 0.2);
+    EXPECT_EQ(found.of_other_vibration, 2U);
+    EXPECT_THAT(found.vibrations, ::testing::ElementsAre("at 15 Hz"));
+    EXPECT_THAT(found.other_vibrations, ::testing::ElementsAre("at 25 Hz"));
+    // AND those at 25 Hz are there for whoever asks for them
+    const auto other = trend_of(campaigns, kShutdownAfterH, false, all_at(25));
+    EXPECT_EQ(other.coefficients[4].points.size(), 2U);
+    EXPECT_EQ(other.of_other_vibration, 11U);
+    EXPECT_EQ(other.coefficients[3].points.size(), 13U);
+    // AND one that is like those of another frequency at its own does not fit
+    campaigns[8].coefficients[4]->value = 4;
+    EXPECT_TRUE(any_outlier(trend_of(campaigns, kShutdownAfterH, false)));
+}
+
+TEST(Trend, WhatIsNotNotedIsAVibrationOfItsOwn) {
+    std::vector<Entry> campaigns{entry_of("1", 0, 1, kU, {}), entry_of("1", 1, 1, kU, {}),
+                                 entry_of("1", 2, 1, kU, 0.0)};
+    auto found = trend_of(campaigns, kShutdownAfterH, false);
+    EXPECT_EQ(found.coefficients[4].points.size(), 1U);
+    EXPECT_THAT(found.vibrations, ::testing::ElementsAre("static"));
+    EXPECT_THAT(found.other_vibrations, ::testing::ElementsAre("of a vibration that is not noted"));
+    campaigns.pop_back();
+    found = trend_of(campaigns, kShutdownAfterH, false);
+    EXPECT_EQ(found.coefficients[4].points.size(), 2U);
+    EXPECT_EQ(found.of_other_vibration, 0U);
+}
+
+TEST(Moved, AnotherFrequencyIsNoChangeOfTheUnitAndAChangeAtTheSameIs) {
+    std::mt19937 random(kSeed);
+    auto history =
+        at_two_frequencies(random, {15, 15, 15, 15, 15, 15, 15, 15, 25, 25, 25, 25, 25, 25});
+    Entry now = history.back();
+    history.pop_back();
+    EXPECT_TRUE(moved(now, history).empty()) << "seed " << kSeed;
+    EXPECT_EQ(count_of_other_vibrations(now.coefficients, history), 8U);
+    // The first at another frequency, or a survey's static ones: nothing to be held against.
+    now.coefficients[4]->value = 100;
+    now.coefficients[4]->at_hz = 0.0;
+    EXPECT_TRUE(moved(now, history).empty());
+    // At the same frequency it is one, and so is a linear one's at any.
+    now.coefficients[4]->at_hz = 25.0;
+    now.coefficients[2]->value = 100;
+    const auto what = moved(now, history);
+    ASSERT_EQ(what.size(), 2U);
+    EXPECT_EQ(what[0].position, 2U);
+    EXPECT_EQ(what[0].by.dof, 12);
+    EXPECT_EQ(what[1].position, 4U);
+    EXPECT_EQ(what[1].by.dof, 4);
 }
 
 /// A unit's life: a campaign a day, its coefficients scattered by `instability`.

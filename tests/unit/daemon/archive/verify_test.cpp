@@ -14,6 +14,7 @@ namespace vibrig::archive {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 class Verify : public Archived {
@@ -45,6 +46,8 @@ TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
     differs("DELETE FROM coefficient WHERE position = 1",
             std::string("coefficient.expanded of ") + estimator::parameter_names()[1] +
                 " of rig/test-1: found nothing, expected \"0.4\"");
+    differs("UPDATE coefficient SET at_hz = 15 WHERE position = 4",
+            "coefficient.at_hz of D_IIx of rig/test-1: found \"15\", expected \"25\"");
     differs("UPDATE result SET verdict = 'doubtful'",
             "result.verdict of rig/test-1: found \"doubtful\", expected \"valid\"");
     differs("UPDATE result SET unit_serial = '0018'",
@@ -52,6 +55,19 @@ TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
     differs("UPDATE campaign SET started_utc_ns = started_utc_ns + 1",
             "campaign.started_utc_ns of rig/test-1: found \"1700001000000000001\", expected "
             "\"1700001000000000000\"");
+}
+
+TEST_F(Verify, SaysOnceOfWhichCampaignTheVibrationIsNotNoted) {
+    add();
+    edit("UPDATE coefficient SET at_hz = NULL");
+    const std::string folder = (lab() / "rig" / "test-1").string();
+    EXPECT_THAT(found(), ElementsAre("not in the index: of which vibration its quadratic "
+                                     "coefficients are is not noted: vibrig archive add " +
+                                     folder));
+    EXPECT_THAT(found(true), IsEmpty()) << "of lengths alone";
+    // What the finding says to do notes it.
+    static_cast<void>(deliver(folder, place(), "rig", {}));
+    EXPECT_THAT(found(), IsEmpty());
 }
 
 }  // namespace

@@ -334,7 +334,8 @@ TEST_F(Identify, NoCommandTakesWhatIsNoNumber) {
          {"commission bus --candump empty.log --for",
           "commission bus --candump empty.log --turn-at",
           "commission units --by Ada --display 'g peak' --reference", "trend 17 --shutdown-after",
-          "study run none --chunk", "predict none.json --profile truck --seconds"}) {
+          "trend 17 --at-hz", "archive type GP-3 --at-hz", "study run none --chunk",
+          "predict none.json --profile truck --seconds"}) {
         const Outcome outcome = vibrig(std::string(command) + " nan");
         EXPECT_EQ(outcome.exit_code, 2) << command;
         EXPECT_THAT(outcome.error, HasSubstr(": found nan, expected a finite number")) << command;
