@@ -1,4 +1,5 @@
 #include "proto/durable_file.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -19,8 +20,6 @@ using ::testing::HasSubstr;
 
 class DurableFile : public ::testing::Test {
   protected:
-    void SetUp() override { fs::create_directories(folder); }
-    void TearDown() override { fs::remove_all(folder); }
     static std::string text_of(const fs::path& path) {
         std::ifstream file(path);
         return {std::istreambuf_iterator<char>(file), {}};
@@ -30,8 +29,7 @@ class DurableFile : public ::testing::Test {
         EXPECT_EQ(::lstat(path.c_str(), &found), 0);
         return found;
     }
-    const fs::path folder =
-        fs::path(::testing::TempDir()) / ("durable" + std::to_string(::getpid()));
+    TemporaryFolder folder;
     const fs::path file = folder / "rig.toml";
 };
 

@@ -12,6 +12,7 @@
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/journal/signing_key.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -25,8 +26,6 @@ constexpr std::int64_t kDay = 86'400'000'000'000;
 
 class Books : public ::testing::Test {
   protected:
-    void SetUp() override { std::filesystem::remove_all(folder); }
-    void TearDown() override { std::filesystem::remove_all(folder); }
     configuration::Loaded loaded(const std::string& more = {}) const {
         return configuration::parse("[commission]\nenforce = true\nsimulated = true\nfolder = \"" +
                                         folder.string() + "\"\n" + more,
@@ -45,8 +44,8 @@ class Books : public ::testing::Test {
         Book book(as);
         book.prove({kParts.begin(), kParts.end()}, what, as);
     }
-    const std::filesystem::path folder =
-        std::filesystem::path(::testing::TempDir()) / ("commission" + std::to_string(::getpid()));
+    const TemporaryFolder temporary;
+    const std::filesystem::path folder = temporary / "of_the_test";  // not there at first
 };
 
 TEST_F(Books, WithoutARecordNothingIsArmedAndTheCommandIsNamed) {

@@ -1,4 +1,5 @@
 #include "daemon/commission/bus_bits.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +16,6 @@ using ::testing::IsEmpty;
 
 class Bits : public ::testing::Test {
   protected:
-    void SetUp() override { std::filesystem::remove_all(folder); }
-    void TearDown() override { std::filesystem::remove_all(folder); }
     void send(BitWatch& watch, double value) const {
         const proto::Message* message = dbc.find(std::string_view("Resolvers"));
         std::array<std::uint8_t, 8> data{};
@@ -24,8 +23,8 @@ class Bits : public ::testing::Test {
         watch.add(message->id, message->extended, std::span(data).first(message->size));
     }
     const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
-    const std::filesystem::path folder =
-        std::filesystem::path(::testing::TempDir()) / ("bits" + std::to_string(::getpid()));
+    const TemporaryFolder temporary;
+    const std::filesystem::path folder = temporary / "of_the_test";  // not there at first
 };
 
 TEST_F(Bits, OneIsProvenByChangingItOnceAndBack) {

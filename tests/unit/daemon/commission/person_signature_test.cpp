@@ -10,6 +10,7 @@
 #include "daemon/commission/book.hpp"
 #include "daemon/journal/signing_key.hpp"
 #include "daemon/serve/pki.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -28,7 +29,6 @@ class Signed : public ::testing::Test {
         person("bo", "Bo", lab);
         person("forged", "Ada", other);
     }
-    void TearDown() override { std::filesystem::remove_all(folder); }
 
     serve::Identity authority(const std::string& name) const {
         serve::CertificateSettings settings;
@@ -90,8 +90,7 @@ class Signed : public ::testing::Test {
     }
 
     static inline const std::int64_t now = std::time(nullptr) * kSecond_ns;
-    const std::filesystem::path folder =
-        std::filesystem::path(::testing::TempDir()) / ("signed" + std::to_string(::getpid()));
+    TemporaryFolder folder;
 };
 
 TEST_F(Signed, ATextIsThatOfWhoHasSignedIt) {

@@ -1,5 +1,6 @@
 // Who has written what to a controller while no daemon has the rig.
 #include "daemon/commission/trial_log.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,9 +19,6 @@ using ::testing::IsEmpty;
 
 class Logged : public ::testing::Test, public TrialPort {
   protected:
-    void SetUp() override { std::filesystem::remove_all(folder); }
-    void TearDown() override { std::filesystem::remove_all(folder); }
-
     Answer read(proto::RegisterTable /*table*/, std::uint16_t address,
                 std::span<std::uint16_t> words) override {
         std::copy_n(holding.begin() + address, words.size(), words.begin());
@@ -38,8 +36,7 @@ class Logged : public ::testing::Test, public TrialPort {
     void wait(double /*seconds*/) override {}
     [[nodiscard]] double now_s() const override { return 0; }
 
-    const std::filesystem::path folder =
-        std::filesystem::path(::testing::TempDir()) / ("trial" + std::to_string(::getpid()));
+    TemporaryFolder folder;
     std::array<std::uint16_t, 16> holding{0, 15000, 0, 0, 100, 0, 0, 1500};
     bool refuses = false;
 };

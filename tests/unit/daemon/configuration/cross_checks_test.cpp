@@ -26,7 +26,8 @@ TEST(Together, ADaemonWithoutAWatchdogRegisterIsRefused) {
 }
 
 TEST(Together, AnotherDbcUnderTheSameNameIsNotWhatWasProved) {
-    const std::string path = ::testing::TempDir() + "proved.dbc";
+    const TemporaryFolder folder;
+    const std::string path = folder.file("proved.dbc");
     const auto keys_with = [&](const std::string& contents) {
         std::ofstream(path) << contents;
         return accepted("can.dbc = \"" + path + "\"\n").campaign.proof.keys;

@@ -1,4 +1,5 @@
 #include "daemon/guard/witnesses.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -228,7 +229,6 @@ class Frames {
                 axes += std::string(" SG_ ") + axis +
                         (part == 0 ? "" : "_" + std::to_string(part)) + " : " +
                         std::to_string(bit) + "|16@1- (0.001,0) [-31|31] \"g\" A\n";
-        path = testing::TempDir() + "several_samples.dbc";
         std::ofstream(path) << "VERSION \"\"\nBU_: A\nBO_ 273 Acc: 64 A\n" << axes;
         settings.dbc = path;
         settings.sample_rate_hz = 1000;
@@ -237,7 +237,8 @@ class Frames {
         settings.platform_valid = {};
         settings.table = "Acc.Axial";
     }
-    std::string path;
+    TemporaryFolder folder;
+    std::string path = folder.file("several_samples.dbc");
     WitnessSettings settings;
 };
 
@@ -371,7 +372,8 @@ TEST(Witnesses, ADbcThatDoesNotFitIsReportedWithThePlaceOfItsKey) {
         "rig.toml:4:7: can.dbc: found \"/nowhere/bus.dbc\" (cannot be opened: No such file or "
         "directory), expected a DBC file that can be read\n");
     // GIVEN one of another rig, and [can.signals] left out
-    const std::string path = testing::TempDir() + "another_rig.dbc";
+    const TemporaryFolder folder;
+    const std::string path = folder.file("another_rig.dbc");
     std::ofstream(path)
         << "VERSION \"\"\nBU_: A\nBO_ 1 M: 8 A\n SG_ S : 0|8@1+ (1,0) [0|0] \"\" A\n";
     const auto said = refusal_of("clock.source = \"rig\"\n[can]\ndbc = \"" + path + "\"\n");

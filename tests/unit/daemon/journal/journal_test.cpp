@@ -21,6 +21,7 @@
 #include "daemon/journal/database.hpp"
 #include "daemon/journal/verify.hpp"
 #include "estimator/identification/result.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::journal {
 namespace {
@@ -42,15 +43,8 @@ std::string replayed(std::vector<DwellCheckpoint>& dwells, double dwell_s) {
 
 /// A folder of its own, gone afterwards.
 struct JournalTest : testing::Test {
-    std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
-                                   ("vibrig-journal-" + std::to_string(::getpid()));
+    TemporaryFolder folder;
     std::string path = (folder / "journal.sqlite3").string();
-
-    JournalTest() {
-        std::filesystem::remove_all(folder);
-        std::filesystem::create_directories(folder);
-    }
-    ~JournalTest() override { std::filesystem::remove_all(folder); }
 
     /// At rest and level, the platform drifting a little: `seconds` at 40 Hz through the filter.
     static DwellCheckpoint dwell(estimator::Identification& filter, int position,

@@ -15,6 +15,7 @@
 
 #include "daemon/journal/database.hpp"
 #include "daemon/journal/journal.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::journal {
 namespace {
@@ -94,12 +95,9 @@ TEST(Latches, BeginTheirAcknowledgementAnewWhenTheyLatchAgain) {
 }
 
 struct KeptLatchesTest : testing::Test {
-    std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
-                                   ("vibrig-latches-" + std::to_string(::getpid()));
+    TemporaryFolder folder;
     std::string path = (folder / "journal.sqlite3").string();
 
-    KeptLatchesTest() { clear(); }
-    ~KeptLatchesTest() override { std::filesystem::remove_all(folder); }
     void clear() const {
         std::filesystem::remove_all(folder);
         std::filesystem::create_directories(folder);

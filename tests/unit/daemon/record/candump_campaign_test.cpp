@@ -13,6 +13,7 @@
 
 #include "drivers/sample/channels.hpp"
 #include "proto/dbc.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::record {
 namespace {
@@ -84,8 +85,7 @@ class CandumpCampaign : public ::testing::Test {
         return campaign;
     }
 
-    fs::path folder_ =
-        fs::path(testing::TempDir()) / ("candump_campaign_" + std::to_string(::getpid()));
+    TemporaryFolder folder_;
 };
 
 TEST_F(CandumpCampaign, OfAnOlderBuildHasNoneOfTheSignalsThatItDidNotKnow) {

@@ -1,4 +1,5 @@
 #include "daemon/record/disk.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -26,9 +27,8 @@ bool seen_by_a_reader(const std::string& path) {
 }
 
 TEST(WriterLock, IsSeenByWhoMayOnlyRead) {
-    std::string folder = "/tmp/vibrig-lock-XXXXXX";
-    ASSERT_NE(::mkdtemp(folder.data()), nullptr);
-    const std::string path = folder + "/campaign.h5";
+    const TemporaryFolder folder;
+    const std::string path = folder.file("campaign.h5");
     std::ofstream(path) << "rows";
     {
         const WriterLock lock(path);
@@ -38,7 +38,6 @@ TEST(WriterLock, IsSeenByWhoMayOnlyRead) {
         EXPECT_TRUE(seen_by_a_reader(path));
     }
     EXPECT_FALSE(seen_by_a_reader(path));
-    std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "daemon/record/dwells_csv.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,9 +20,6 @@ constexpr std::int64_t kOffset_ns = 1'700'000'000'000'000'000;
 
 class DwellsCsv : public testing::Test {
   protected:
-    DwellsCsv() { std::filesystem::create_directories(folder_); }
-    ~DwellsCsv() override { std::filesystem::remove_all(folder_); }
-
     [[nodiscard]] Campaign read(const std::string& lines) const {
         std::ofstream(folder_ / "dwells.csv") << kDwellsHeader << "\n" << lines;
         Campaign campaign;
@@ -29,8 +27,7 @@ class DwellsCsv : public testing::Test {
         return campaign;
     }
 
-    std::filesystem::path folder_ =
-        std::filesystem::path(testing::TempDir()) / ("dwells_csv_" + std::to_string(::getpid()));
+    TemporaryFolder folder_;
 };
 
 /// Every field another value.

@@ -1,4 +1,5 @@
 #include "daemon/record/pre_trip.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,14 +18,11 @@ using drivers::kSecond;
 using drivers::Time;
 
 struct PreTripTest : testing::Test {
-    std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
-                                   ("vibrig-pre-trip-" + std::to_string(::getpid()));
+    const TemporaryFolder temporary;
+    const std::filesystem::path folder = temporary / "of_the_test";  // not there at first
     std::vector<EventRecord> events;
     std::mutex mutex;
     std::vector<std::pair<Severity, std::string>> reported;
-
-    PreTripTest() { std::filesystem::remove_all(folder); }
-    ~PreTripTest() override { std::filesystem::remove_all(folder); }
 
     PreTrip make(const std::filesystem::path& where) {
         return {where.string(), 25 * kMillisecond, [this] { return events; },
