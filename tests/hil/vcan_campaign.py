@@ -256,7 +256,7 @@ def with_pymodbus(checks, programs, folder):
     """The daemon's Modbus side against an independent implementation, which drives the table of the simulated rig."""
     rig = r.Rig(programs, BUS, "real", folder)
     rig.modbus_port = 1502
-    rig.configure(SHORT, **r.PATIENT)
+    rig.configure(SHORT, **{**r.PATIENT, "shaker": {"response_timeout_ms": 5000}})   # its feeds are counted
     platform = r.Rig(programs, BUS, "real", folder)
     played = None
     try:
