@@ -107,47 +107,64 @@ class RecordingReader::Rows {
 
   private:
     /// Tells a dwell that is there twice: times may begin anew in each dwell, but noise does not
-    /// come again. Told by the first rows, so that a copy that was cut short is found, too.
+    /// come again. Told by a second of rows, so that a copy that was cut short is found, too.
     class CopiesSeen {
+        using Bits = std::uint64_t;
+
       public:
         void begin(std::size_t line) {
             line_ = line;
-            rows_ = changes_ = 0;
-            hash_ = kFnvOffset;
+            rows_ = 0;
         }
-        /// The line where the same samples began before; 0: they are new, or too few to tell yet.
+        /// The line where a dwell begins that has the newest samples too; 0: they are new, or too
+        /// few to tell yet.
         [[nodiscard]] std::size_t add(const RecordingRow& row) {
-            if (rows_ == kTold) return 0;
-            // Whoever copies a dwell may have moved it in time: to the nanosecond it is one all the
-            // same.
-            if (rows_ == 0) began_s_ = row.time_s;
-            mix(std::round((row.time_s - began_s_) * 1e9));
-            const auto before = std::exchange(readings_, {row.angle_deg, row.force_g});
-            for (const double angle : row.angle_deg) mix(angle);
-            for (const double force : row.force_g) mix(force);
-            if (rows_ > 0 && readings_ != before) ++changes_;
-            if (++rows_ < kTold) return 0;
+            std::uint64_t readings = kFnvOffset;  // + 0.0: "-0" is "0"
+            for (const double angle : row.angle_deg)
+                mix(readings, std::bit_cast<Bits>(angle + 0.0));
+            for (const double force : row.force_g) mix(readings, std::bit_cast<Bits>(force + 0.0));
+            newest_[rows_ % kTold] = {row.time_s, readings};
+            ++rows_;
+            if (rows_ < kTold) return 0;
+            // Those that a dwell begins with, and behind readings that say so themselves: whoever
+            // cuts a dwell out of a record once more need not cut it at the same row.
+            const Seen& first = newest_[rows_ % kTold];
+            if (rows_ > kTold && first.readings % kOneIn != 0) return 0;
+            std::uint64_t hash = kFnvOffset;
+            std::size_t changes = 0;
+            for (std::size_t k = 0, last = first.readings; k < kTold; ++k) {
+                const Seen& seen = newest_[(rows_ + k) % kTold];
+                // Whoever copies a dwell may have moved it in time: to the nanosecond it is one all
+                // the same.
+                mix(hash, std::bit_cast<Bits>(std::round((seen.time_s - first.time_s) * 1e9)));
+                mix(hash, seen.readings);
+                changes += std::exchange(last, seen.readings) != seen.readings ? 1U : 0U;
+            }
             // Instruments too coarse for the noise show nothing by which one dwell is another.
-            if (2 * changes_ < kTold) return 0;
-            const auto [known, fresh] = begun_.emplace(hash_, line_);
-            return fresh ? 0 : known->second;
+            if (2 * changes < kTold) return 0;
+            const auto [known, fresh] = dwells_.emplace(hash, line_);
+            return fresh || known->second == line_ ? 0 : known->second;
         }
         [[nodiscard]] std::size_t line() const { return line_; }  ///< where the dwell began
 
       private:
         static constexpr std::size_t kTold = 40;  ///< 1 s of the usual 40 samples/s
+        static constexpr std::size_t kOneIn = 64;
         static constexpr std::uint64_t kFnvOffset = 0xcbf29ce484222325U, kFnvPrime = 0x100000001b3U;
 
-        void mix(double value) {
-            hash_ = (hash_ ^ std::bit_cast<std::uint64_t>(value)) * kFnvPrime;
-            hash_ ^= hash_ >> 32U;
+        struct Seen {
+            double time_s = 0;
+            std::uint64_t readings = 0;
+        };
+
+        static void mix(Bits& hash, Bits value) {
+            hash = (hash ^ value) * kFnvPrime;
+            hash ^= hash >> 32U;
         }
 
-        std::size_t line_ = 0, rows_ = 0, changes_ = 0;
-        double began_s_ = 0;
-        std::pair<std::array<double, 3>, std::array<double, 3>> readings_{};
-        std::uint64_t hash_ = kFnvOffset;
-        std::unordered_map<std::uint64_t, std::size_t> begun_;  ///< lines by their first rows
+        std::size_t line_ = 0, rows_ = 0;
+        std::array<Seen, kTold> newest_{};
+        std::unordered_map<std::uint64_t, std::size_t> dwells_;  ///< where they begin, by samples
     };
 
     [[noreturn]] void fail(std::string_view column, const std::string& what) const {

@@ -316,6 +316,35 @@ TEST_F(Recording, RefusesADwellThatIsThereTwice) {
     EXPECT_EQ(read(kHeader + coarse + dwell(2, 0.2, 100) + coarse).size(), 300U);
 }
 
+TEST_F(Recording, RefusesADwellThatWasCutOutOnceMoreAtAnotherRow) {
+    // GIVEN dwells of 15 s each, with noise of their own
+    const auto dwell = [](int position, unsigned seed, int from, int to) {
+        std::mt19937 random(seed);
+        std::normal_distribution<double> noise(0, 1e-3);
+        std::string text;
+        for (int i = 0; i < to; ++i) {
+            const double x = noise(random);
+            if (i >= from)
+                text += std::to_string(0.025 * i) + ",1," + std::to_string(position) + ",0,0,0," +
+                        std::to_string(x) + ",1,0\n";
+        }
+        return text;
+    };
+    std::string all = kHeader;
+    for (int p = 1; p <= 20; ++p) all += dwell(p, static_cast<unsigned>(p), 0, 600);
+    EXPECT_EQ(read(all).size(), 12'000U);
+    int found = 0;
+    for (int p = 1; p <= 20; ++p) {
+        const std::string what = error(all + dwell(20 + p, static_cast<unsigned>(p), p, 600 - p));
+        found += what.find("with the samples of the dwell of line " +
+                           std::to_string(2 + 600 * (p - 1))) != std::string::npos
+                     ? 1
+                     : 0;
+    }
+    // One row in 64 tells: of 540 or more no one does once in 4000 dwells.
+    EXPECT_GE(found, 19);
+}
+
 TEST_F(Recording, KnowsTwoRolesAndOneForADwell) {
     const std::string header =
         "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g,role\n";
