@@ -9,7 +9,6 @@
 
 #include "daemon/record/shaken.hpp"
 #include "daemon/report/paperwork.hpp"
-#include "daemon/results/spectrum_result.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/encoder_angles.hpp"
 #include "estimator/identification/crlb.hpp"
@@ -303,13 +302,11 @@ Coefficients final_coefficients(const std::string& path, const std::vector<recor
     return {last.value, last.sigma, last.observable, last.covariance};
 }
 
-Coefficients recorded_coefficients(const Campaign& campaign) {
-    if (!campaign.found) return final_coefficients(campaign.path, campaign.dwells);
-    const auto anew = record::anew(campaign, rig_of(campaign).estimator, *campaign.found);
-    estimator::Estimate estimate;
-    anew.identification().solved(estimate);
-    return {estimate.value, estimate.sigma, estimate.observable,
-            anew.identification().covariance()};
+Frequencies frequencies_of(const tool::Assessed& found, const estimator::Settings& settings) {
+    Frequencies hz{};
+    for (std::size_t i = 0; i < kParameters; ++i)
+        hz[i] = found.assessed.over_frequency ? found.spectrum->at_hz(i) : settings.frequency_hz;
+    return hz;
 }
 
 Analysis analyse(const Campaign& campaign, const configuration::Configuration& rig,
@@ -320,9 +317,10 @@ Analysis analyse(const Campaign& campaign, const configuration::Configuration& r
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
     out.coefficients = final_coefficients(campaign.path, out.replayed);
-    out.assessed = tool::assess(settings, out.replayed.found, out.replayed.result,
-                                out.replayed.rows, record::shaken_of(campaign, rig))
-                       .assessed;
+    auto judgement = tool::assess(settings, out.replayed.found, out.replayed.result,
+                                  out.replayed.rows, record::shaken_of(campaign, rig));
+    out.at_hz = frequencies_of(judgement, settings);
+    out.assessed = std::move(judgement.assessed);
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

@@ -9,6 +9,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/report/compensation.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
@@ -36,10 +37,17 @@ struct Innovations {
     std::size_t count = 0;
 };
 
+/// Of which vibration each quadratic coefficient of a result is, Hz; 0: static; NaN: of none.
+using Frequencies = std::array<double, estimator::kParameters>;
+[[nodiscard]] Frequencies frequencies_of(const tool::Assessed& found,
+                                         const estimator::Settings& settings);
+
 struct Analysis {
     record::ReplayResult replayed;
     Coefficients coefficients;                    ///< of a constant bias, sigma of noise alone
     estimator::uncertainty::Assessment assessed;  ///< over frequency, where there are several
+    Frequencies at_hz{};
+    std::string anew_with;  ///< the settings' file; empty: those of the recording
     estimator::Settings settings;
     Innovations innovations;
     std::vector<HeldOut> held_out;
@@ -63,8 +71,6 @@ using Progress = std::function<void(double fraction)>;
 [[nodiscard]] bool apart(const estimator::Settings& settings, const record::Order& order);
 /// Of its first sample, on the daemon's clock; 0: there is none.
 [[nodiscard]] double origin_s(const record::Campaign& campaign);
-/// The same of a recording that is not replayed.
-[[nodiscard]] Coefficients recorded_coefficients(const record::Campaign& campaign);
 /// As it lies in the recording, its noise that which was found.
 [[nodiscard]] configuration::Configuration rig_of(const record::Campaign& campaign);
 /// Coefficients of a campaign's result.

@@ -212,9 +212,38 @@ Json annex_of(const Campaign& campaign, const Json& result, const record::Replay
             {"issued_with", std::string("vibrig ") + kVersion}};
 }
 
+std::string printed_number(const Json& of, const char* name, const char* format) {
+    const auto found = of.find(name);
+    return found != of.end() && found->is_number()
+               ? fmt::format(fmt::runtime(format), found->get<double>())
+               : "?";
+}
+
+/// What was estimated besides the 30, and what the laboratory says of motion that the data cannot
+/// tell.
+void add_assumed(const Campaign& campaign, const Json& result, Json& rows) {
+    for (const auto& one : result.value("freed", Json::array())) {
+        const Json element = one.value("element", Json()), unit = one.value("unit", Json());
+        rows.push_back(fmt::format(
+            "estimated beside the coefficients (estimator.free): {}{}, {} +- {}{} (1 sigma)",
+            one.value("class", "?"), element.is_string() ? " " + element.get<std::string>() : "",
+            printed_number(one, "value", "{:.3g}"), printed_number(one, "sigma", "{:.2g}"),
+            unit.is_string() ? " " + unit.get<std::string>() : ""));
+    }
+    if (configuration_of(campaign).estimator.uncertainty.sync_motion ==
+        estimator::uncertainty::SyncMotionOf::base)
+        rows.push_back(fmt::format(
+            "declared by the laboratory (uncertainty.sync_motion = \"base\"): the angles' motion "
+            "in step with the vibration, up to {} arcsec, is rocking of the base; U has nothing of "
+            "it",
+            printed_number(result, "sync_motion_arcsec", "{:.2g}")));
+}
+
 /// What was not as the method has it.
-Json deviations_of(const record::ReplayResult& replayed) {
+Json deviations_of(const Campaign& campaign, const Json& result,
+                   const record::ReplayResult& replayed) {
     Json rows = Json::array();
+    add_assumed(campaign, result, rows);
     for (const auto& dwell : replayed.dwells) {
         const auto& s = dwell.summary;
         if (s.flagged || s.left_out)
@@ -277,7 +306,7 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     root["issued_by"] = issue.by;
     root["method"] = method_of(result);
     root["frequencies"] = frequencies_of(result);
-    root["deviations"] = deviations_of(replayed);
+    root["deviations"] = deviations_of(campaign, result, replayed);
     root["equation"] = kDriftModel;
     root["conditions"] = conditions_of(campaign);
     root["traceability"] = instruments_of(campaign);

@@ -23,8 +23,9 @@ std::string fixed(double value, int digits) { return fmt::format("{:.{}f}", valu
 
 std::string text(const Json& of, const char* name) { return or_dash(of.value(name, "")); }
 
+/// As it stands in the JSON: a statement of conformity rests on all its digits.
 std::string number_or(const Json& value, const char* none) {
-    return value.is_number() ? fmt::format("{:g}", value.get<double>()) : none;
+    return value.is_number() ? fmt::format("{}", value.get<double>()) : none;
 }
 
 void add_who(Page& page, const Json& c) {
@@ -51,7 +52,7 @@ std::string vibration_of(const Json& result) {
     const Json hz = result.value("at_hz", Json());
     if (result.value("unit", "") != "deg/h/g^2") return "any";
     if (!hz.is_number()) return "not stated";
-    return hz == 0 ? "static" : number_or(hz, "") + " Hz";
+    return hz == 0 ? "static" : fmt::format("{:g} Hz", hz.get<double>());
 }
 
 void add_results(Page& page, const Json& c) {
@@ -187,11 +188,8 @@ void add_annex(Page& page, const Json& c) {
 
 std::string certificate_page(const Json& certificate) {
     Page page;
-    if (certificate.value("simulated", false)) {
-        page.mark("SIMULATED");
-    } else if (certificate["verdict"].value("word", "") != "valid") {
-        page.mark("DOUBTFUL");
-    }
+    if (certificate.value("simulated", false)) page.mark("SIMULATED");
+    if (certificate["verdict"].value("word", "") != "valid") page.mark("DOUBTFUL");
     page.foot("Certificate " + certificate.value("number", "") + ", " +
               certificate["laboratory"].value("name", ""));
     page.paragraph("Number " + certificate.value("number", "") + ". " +

@@ -17,15 +17,21 @@ using estimator::kParameters;
 
 Coefficients combined(const estimator::uncertainty::Assessment& assessed,
                       const Coefficients& otherwise) {
-    const bool all = std::ranges::all_of(otherwise.observable, [](bool b) { return b; });
-    if (!assessed.done || !all) return otherwise;
+    if (!assessed.done) return otherwise;
     Coefficients out = otherwise;
+    out.combined = true;
+    const auto known = [&](std::size_t i) {
+        return otherwise.observable[i] && std::isfinite(assessed.coefficients[i].u);
+    };
     for (std::size_t i = 0; i < kParameters; ++i) {
+        if (!known(i)) continue;
         out.value[i] = assessed.coefficients[i].value;
         out.sigma[i] = assessed.coefficients[i].u;
-        for (std::size_t j = 0; j < kParameters; ++j)
-            out.covariance[i * kParameters + j] = assessed.covariance_combined(
-                static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            if (known(j))
+                out.covariance[i * kParameters + j] = assessed.covariance_combined(
+                    static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+        }
     }
     return out;
 }

@@ -13,10 +13,13 @@ struct Coefficients {
     std::array<double, estimator::kParameters> value{}, sigma{};
     std::array<bool, estimator::kParameters> observable{};
     std::vector<double> covariance;  ///< 30 x 30, row-major, order of parameter_names()
+    /// `sigma` is the standard uncertainty u, and `covariance` the combined one; else both are of
+    /// the filter's noise alone.
+    bool combined = false;
 };
 
-/// With a bias that may have moved and the declared inputs: the combined covariance, whole. Where
-/// that is not to be had, `otherwise`.
+/// With a bias that may have moved and the declared inputs: the combined covariance, whole, of all
+/// that is determined. What is not stays as `otherwise` has it; without an assessment, all.
 [[nodiscard]] Coefficients combined(const estimator::uncertainty::Assessment& assessed,
                                     const Coefficients& otherwise);
 

@@ -40,7 +40,7 @@ pre{font-size:.75rem;overflow-x:auto;background:var(--band);padding:.8rem;border
 summary{cursor:pointer;color:var(--link)}
 .sign{display:grid;grid-template-columns:1fr 1fr;gap:3rem;margin-top:3.5rem}
 .sign div{border-top:1px solid var(--ink);padding-top:.3rem;color:var(--soft);font-size:.86rem}
-.mark{position:fixed;inset:0;z-index:9;pointer-events:none;display:flex;align-items:center;justify-content:center;overflow:hidden}
+.mark{position:fixed;inset:0;z-index:9;pointer-events:none;display:flex;flex-direction:column;gap:6rem;align-items:center;justify-content:center;overflow:hidden}
 .mark span{transform:rotate(-35deg);font:700 min(17vw,9rem)/1 system-ui,sans-serif;letter-spacing:.06em;color:var(--bad);opacity:.13}
 @page{size:A4;margin:16mm 14mm 18mm;@bottom-right{content:"page " counter(page) " of " counter(pages);font:8pt sans-serif}}
 @media print{:root{--ink:#000;--paper:#fff;--soft:#444;--rule:#bbb;--band:#f4f4f4;--bad:#900;--link:#000}
@@ -93,9 +93,7 @@ void Page::foot(const std::string& text) {
     foot_ = "@page{@bottom-left{content:\"" + content + "\";font:8pt sans-serif}}\n";
 }
 
-void Page::mark(const std::string& word) {
-    mark_ = "<div class=\"mark\" role=\"note\"><span>" + xml_text(word) + "</span></div>\n";
-}
+void Page::mark(const std::string& word) { mark_ += "<span>" + xml_text(word) + "</span>"; }
 
 std::string Page::html(const std::string& title, const std::vector<std::string>& signatures) const {
     std::string signs;
@@ -104,8 +102,9 @@ std::string Page::html(const std::string& title, const std::vector<std::string>&
     return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
            xml_text(title) + "</title>\n<style>" + kStyle + foot_ + "</style></head><body>\n" +
-           mark_ + "<h1>" + xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" +
-           contents_ + "</nav>\n" + (head == std::string::npos ? "" : body_.substr(head)) +
+           (mark_.empty() ? "" : "<div class=\"mark\" role=\"note\">" + mark_ + "</div>\n") +
+           "<h1>" + xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ +
+           "</nav>\n" + (head == std::string::npos ? "" : body_.substr(head)) +
            "<div class=\"sign\">" + signs + "</div>\n</body></html>\n";
 }
 

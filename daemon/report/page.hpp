@@ -17,7 +17,7 @@ class Page {
     void table(const Rows& rows, const std::string& kind = "");
     void figure(const std::string& svg, const std::string& caption);
     void details(const std::string& summary, const std::string& preformatted);
-    /// Across every page, such as "SIMULATED".
+    /// Across every page, such as "SIMULATED"; several, one below the other.
     void mark(const std::string& word);
     /// Left of the page's number, on every printed page.
     void foot(const std::string& text);

@@ -59,6 +59,12 @@ void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
         "determined by the data.",
         head.name, utc_text(head.utc_ns), campaign.state, a.replayed.dwells.size(),
         campaign.samples.size(), observable));
+    if (!a.anew_with.empty())
+        page.table({{"settings"},
+                    {"!identified anew with " + a.anew_with +
+                     ", not as recorded; what was recorded beside it (over frequency, the unit's "
+                     "type, earlier campaigns) is of the recorded settings"}},
+                   "words");
 }
 
 void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
@@ -77,7 +83,8 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
                                 std::string(estimator::compiler()) + ", " +
                                 std::string(estimator::instruction_set())},
               {"Replay",
-               a.replayed.compared == 0 ? "no dwell to compare"
+               !a.anew_with.empty()       ? "not compared: identified anew with other settings"
+               : a.replayed.compared == 0 ? "no dwell to compare"
                : a.replayed.as_recorded()
                    ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
                                  a.replayed.compared)
@@ -105,13 +112,21 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
 
 void add_coefficients(Page& page, const Analysis& a) {
     page.section("coefficients", "Coefficients");
-    if (a.assessed.over_frequency)
-        page.paragraph(fmt::format(
-            "Of the dwells at rest and at {:g} Hz alone, as the filter has them. The result, over "
-            "frequencies, is in the sections Uncertainty and Over frequency.",
-            a.settings.frequency_hz));
-    Rows rows{{"coefficient", "value", "sigma", "95 % from", "95 % to", "unit", "expected sigma",
-               "efficiency", "correlates with"}};
+    const bool assessed = a.assessed.done;
+    page.paragraph(
+        assessed ? "Value and interval are the result's: value +- U, as in the section Uncertainty."
+                 : "Value and interval are the filter's, of noise alone: the uncertainty was not "
+                   "assessed.");
+    page.paragraph(
+        a.assessed.over_frequency
+            ? fmt::format("Of the dwells at rest and at {:g} Hz alone, and of noise alone, are "
+                          "sigma, efficiency and correlations, as the filter has them.",
+                          a.settings.frequency_hz)
+            : "Sigma, efficiency and correlations are the filter's, of noise alone.");
+    const std::string percent =
+        fmt::format("{:g} % ", assessed ? 100 * a.settings.uncertainty.coverage : 95);
+    Rows rows{{"coefficient", "value", "sigma", percent + "from", percent + "to", "unit",
+               "expected sigma", "efficiency", "correlates with"}};
     for (std::size_t i = 0; i < kParameters; ++i) {
         const char* name = estimator::parameter_names()[i];
         if (!a.coefficients.observable[i]) {
@@ -119,7 +134,9 @@ void add_coefficients(Page& page, const Analysis& a) {
                             "-", "-", "-"});
             continue;
         }
-        const double v = a.coefficients.value[i], s = a.coefficients.sigma[i];
+        const double s = a.coefficients.sigma[i];
+        const double v = assessed ? a.assessed.coefficients[i].value : a.coefficients.value[i];
+        const double half = assessed ? a.assessed.coefficients[i].expanded : k95 * s;
         std::size_t partner = i == 0 ? 1 : 0;
         for (std::size_t j = 0; j < kParameters; ++j) {
             if (j != i && a.coefficients.observable[j] &&
@@ -128,7 +145,7 @@ void add_coefficients(Page& page, const Analysis& a) {
                 partner = j;
         }
         const double expected = a.expected_sigma[i];
-        rows.push_back({name, num(v, 6), num(s, 6), num(v - k95 * s, 6), num(v + k95 * s, 6),
+        rows.push_back({name, num(v, 6), num(s, 6), num(v - half, 6), num(v + half, 6),
                         estimator::parameter_unit(i), num(expected, 6), num(expected / s, 2),
                         fmt::format("{} {:+.2f}", estimator::parameter_names()[partner],
                                     correlation(a.coefficients, i, partner))});
@@ -272,52 +289,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
         page.paragraph(a.history_note);
         if (a.history.size() > 1) page.table(a.history);
     }
-    page.section("comparison", "Comparison with an earlier campaign");
-    if (!earlier) {
-        page.paragraph("None was given (--compare CAMPAIGN).");
-    } else {
-        page.paragraph(
-            fmt::format("{} of {}, unit {}. E_n is the difference over the root of the sum of the "
-                        "squared 95 % uncertainties (ISO 13528); up to 1 agrees.",
-                        earlier->name, earlier->when, unit_text(earlier->paperwork)));
-        if (const auto unit = paperwork_of(campaign);
-            unit.unit_type != earlier->paperwork.unit_type ||
-            unit.unit_serial != earlier->paperwork.unit_serial)
-            page.paragraph("Warning: this is another unit than that of this campaign, " +
-                           unit_text(unit) + ".");
-        if (a.assessed.over_frequency)
-            page.paragraph(
-                fmt::format("Compared are the filter's, of rest and of {:g} Hz, with those of the "
-                            "earlier campaign's own vibration.frequency_hz.",
-                            a.settings.frequency_hz));
-        Rows rows{{"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
-        double square = 0;
-        std::size_t count = 0, apart = 0;
-        for (std::size_t i = 0; i < kParameters; ++i) {
-            if (!a.coefficients.observable[i] || !earlier->coefficients.observable[i]) continue;
-            const double difference = a.coefficients.value[i] - earlier->coefficients.value[i];
-            const double u =
-                k95 * std::hypot(a.coefficients.sigma[i], earlier->coefficients.sigma[i]);
-            const double score = difference / u;
-            ++count;
-            square += difference * difference / (u * u / k95 / k95);
-            if (std::abs(score) > 1) ++apart;
-            rows.push_back({estimator::parameter_names()[i], num(a.coefficients.value[i], 6),
-                            num(earlier->coefficients.value[i], 6), num(difference, 6),
-                            estimator::parameter_unit(i),
-                            (std::abs(score) > 1 ? "!" : "") + num(score, 2)});
-        }
-        if (count == 0)
-            page.paragraph("Nothing is comparable: no coefficient is determined by both.");
-        if (count > 0) {
-            page.table(rows);
-            page.paragraph(
-                fmt::format("Repeatability: differences are {:.2f} of their expected "
-                            "standard deviations, root mean square; {} of {} beyond E_n = "
-                            "1, where 5 % are expected.",
-                            std::sqrt(square / static_cast<double>(count)), apart, count));
-        }
-    }
+    add_comparison(page, campaign, a, earlier);
 
     page.section("events", "Events");
     Rows rows{{"UTC", "", "from", "what"}};
@@ -336,35 +308,21 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
         page.table(gaps, "words");
     }
     page.section("configuration", "Configuration");
+    if (!a.anew_with.empty())
+        page.paragraph("Of the recording. The result is one of the settings in " + a.anew_with +
+                       ".");
     page.paragraph("Hash of what the results depend on: " + campaign.head.configuration_hash);
     page.details("Effective configuration", campaign.head.configuration);
 }
 
 }  // namespace
 
-Earlier earlier_of(const Campaign& earlier, const Campaign& now, bool same_unit) {
-    std::error_code error;
-    if (std::filesystem::equivalent(earlier.path, now.path, error) ||
-        (earlier.head.campaign == now.head.campaign && earlier.head.utc_ns == now.head.utc_ns))
-        throw std::runtime_error(earlier.path +
-                                 ": found the campaign itself, expected another one to compare");
-    for (const Campaign* campaign : {&earlier, &now}) {
-        if (!same_unit && paperwork_of(*campaign).unit_serial.empty())
-            throw std::runtime_error(
-                campaign->path +
-                ": found no serial number ([unit] serial) in its configuration, expected one to "
-                "compare a unit with itself (--same-unit: it is the same)");
-    }
-    return {earlier.path, earlier.head.name, utc_text(earlier.head.utc_ns), paperwork_of(earlier),
-            recorded_coefficients(earlier)};
-}
-
 std::string make_page(const Campaign& campaign, const Analysis& analysis,
                       const std::optional<Earlier>& earlier) {
     Page page;
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
-    add_uncertainty(page, analysis.assessed, coverage_of(campaign));
+    add_uncertainty(page, analysis.assessed, analysis.settings.uncertainty.coverage);
     add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);

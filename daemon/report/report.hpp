@@ -12,11 +12,13 @@ namespace vibrig::report {
 struct Earlier {
     std::string path, name, when;
     configuration::Paperwork paperwork;
-    Coefficients coefficients;
+    estimator::uncertainty::Assessment assessed;
+    Frequencies at_hz{};
 };
 
-/// Figures of a recorded campaign; throws for the campaign that it is to be compared with itself,
-/// and unless both state the unit's serial number or somebody says that it is the `same_unit`.
+/// Result of a recorded campaign, of its replay; throws for the campaign that it is to be compared
+/// with itself, and unless both state the unit's serial number or somebody says that it is the
+/// `same_unit`.
 [[nodiscard]] Earlier earlier_of(const record::Campaign& earlier, const record::Campaign& now,
                                  bool same_unit);
 

@@ -5,6 +5,7 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/report/analysis.hpp"
 #include "daemon/report/page.hpp"
+#include "daemon/report/report.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {
@@ -42,5 +43,9 @@ void add_spectrum(Page& page, const record::Campaign& campaign);
 /// The coefficients without and with what the archive knew of the unit's type, where the campaign
 /// was planned by it (campaign.prior).
 void add_type(Page& page, const record::Campaign& campaign);
+
+/// The coefficients beside those of an earlier campaign, with E_n.
+void add_comparison(Page& page, const record::Campaign& campaign, const Analysis& a,
+                    const std::optional<Earlier>& earlier);
 
 }  // namespace vibrig::report

@@ -127,6 +127,28 @@ def check_recording(checks, rig, folder):
     return campaign
 
 
+def check_anew(checks, rig, folder):
+    """What is identified with other settings says with which, in whatever form, and has their coverage."""
+    other = os.path.join(rig.folder, "other.toml")
+    with open(rig.configuration, encoding="utf-8") as file:
+        text = file.read()
+    with open(other, "w", encoding="utf-8") as file:
+        file.write(text + "\n[uncertainty]\ncoverage = 0.5\n")
+    words = "identified anew with " + other + ", not as recorded"
+    for kind in ("text", "csv", "c"):
+        anew, recorded = (tool(rig, "compensate", folder, "--to", kind, *more).stdout for more in (("--config", other), ()))
+        checks.check(words in anew and "identified anew" not in recorded and "verdict: " in recorded,
+                     f"compensate --config says so as {kind}", anew[:1500] + recorded[:1500])
+    said = [json.loads(tool(rig, "compensate", folder, "--json", *more).stdout) for more in (("--config", other), ())]
+    checks.check([one["identified_anew_with"] for one in said] == [other, None] and said[1]["verdict"]["word"] == "valid" and
+                 all(c["u"] == c["sigma"] > 0 for c in said[1]["coefficients"]), "and as JSON, with verdict and u", str(said)[:1500])
+    run = tool(rig, "report", folder, "--config", other, "-o", "anew.html", "--json")
+    with open(os.path.join(rig.folder, "anew.html"), encoding="utf-8") as file:
+        page = file.read()
+    checks.check(words in page and "probability of about 50 %" in page and json.loads(run.stdout)["identified_anew_with"] == other,
+                 "report --config says so on its page and as JSON, with the coverage of these settings", run.stdout + run.stderr)
+
+
 def check_cycle_times(checks, campaign):
     """What the DBC says of the rig's messages is what is on its bus."""
     stated = {int(i): int(ms) for i, ms in re.findall(r'BA_ "GenMsgCycleTime" BO_ (\d+) (\d+);', campaign.dbc)}
@@ -355,6 +377,17 @@ def certificate_of_lies(checks, rig, campaign, paper):
                          ("numbers for coefficients", lambda r: r.update(parameters=[5] * 30)),
                          ("another spectrum", lambda r: r.update(spectrum={"frequencies": [5], "sweeps": 3}))):
         lied(what, lambda r, change=change: (r.clear(), r.update(json.loads(json.dumps(honest))), change(r)))
+    with h5py.File(os.path.join(away, "campaign.h5"), "r+") as file:
+        file.attrs.modify("started_utc_ns", np.int64(1772352000 * 10**9))
+    with open(paper, encoding="utf-8") as file:
+        text = file.read()
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text + "[item]\nreceived = 2026-03-02\n")
+    run = tool(rig, "certificate", away, *command)
+    checks.check(run.returncode == 2 and "received: found 2026-03-02, expected none after the day on which the campaign began (UTC), 2026-03-01" in run.stderr,
+                 "an item is not calibrated before it was received", run.stderr)
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text)
     checks.equal([name for name in os.listdir(rig.folder) if name.startswith("no.")], [], "and nothing is left of them")
     checks.check(value is not None, "the coefficient is determined")
 
@@ -400,10 +433,14 @@ def check_contradiction(checks, programs, folder):
     with open(os.path.join(folder, "paper.toml"), "w", encoding="utf-8") as file:
         file.write('number = "1"\n[laboratory]\nname = "L"\n[customer]\nname = "C"\n')
     for command in (("identify", recording), ("replay", recording), ("report", recording, "-o", "r.html"),
+                    *(("compensate", recording, "--to", kind) for kind in ("text", "json", "csv", "c")),
                     ("certificate", recording, "--paper", "paper.toml", "--by", "A", "--no-journal")):
         run = tool(rig, *command)
         checks.check(run.returncode == 1 and "the configuration does not fit the recording: " in run.stdout + run.stderr and
                      "not valid" in run.stdout + run.stderr, f"vibrig {command[0]}: a configuration that does not fit is no result", f"status {run.returncode} {(run.stdout + run.stderr)[-600:]}")
+        if command[0] == "compensate":
+            checks.check("not valid" in run.stdout and "verdict: not valid" in run.stderr, f"and what compensates says so itself: {command[-1]}",
+                         run.stdout[:1500])
 
 
 def main():
@@ -434,6 +471,7 @@ def main():
             check_certificate(checks, rig, vibrig.open(recording))
             rig.stop()
             campaign = check_recording(checks, rig, recording)
+            check_anew(checks, rig, recording)
             check_cycle_times(checks, campaign)
             check_octave(checks, rig, campaign)
             check_examples(checks, campaign)

@@ -595,6 +595,10 @@ def report(checks, rig, folder):
     checks.equal(foreign, [], "it needs nothing else")
     table = json.loads(offline(rig, "compensate", folder, "--json", "--attitude", "0,0,0").stdout)
     checks.equal(len(table["coefficients"]), 30, "compensate gives the table of coefficients")
+    # Some of these are not determined: the others have their u all the same.
+    known = json.loads(offline(rig, "identify", folder, "--json").stdout)["parameters"]
+    checks.equal([(c["value"], c["u"]) for c in table["coefficients"]], [(p["value"], p["u"]) for p in known],
+                 "with value and u of identify, though some are not determined")
     rows = offline(rig, "compensate", folder, "--to", "csv", "--attitude", "45,0,90", "--table-g", "9").stdout.splitlines()
     comments = [row for row in rows if row.startswith("# ")]
     checks.check(any("gyro x +x +y +z" in row and "drift sign -1" in row for row in comments) and

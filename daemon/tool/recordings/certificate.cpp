@@ -293,6 +293,11 @@ int certify(const CertificateArguments& arguments) {
     CertificateFiles files(arguments.output);
     if (!arguments.no_journal) look_for_daemon(arguments);
     const auto campaign = read_named_campaign(arguments.campaign);
+    const std::string begun = report::utc_text(campaign.head.utc_ns).substr(0, 10);
+    if (issue.received > begun)
+        throw std::runtime_error(
+            arguments.paper + ": received: found " + issue.received +
+            ", expected none after the day on which the campaign began (UTC), " + begun);
     nlohmann::ordered_json certificate;
     try {
         certificate = certificate_for(campaign, issue);

@@ -122,6 +122,7 @@ int make_report(const ReportArguments& arguments) {
         });
     }
     doubt_replayed(rig.estimator, analysis.replayed, analysis.assessed.verdict);
+    analysis.anew_with = proto::printable(arguments.config, proto::kLongestLine);
     try {
         add_history(campaign, arguments.archive, analysis);
     } catch (const std::exception& error) {
@@ -149,7 +150,8 @@ int make_report(const ReportArguments& arguments) {
         Json written{{"campaign", campaign.head.name},
                      {"file", arguments.output},
                      {"pdf", text_or_null(arguments.pdf)},
-                     {"compared_with", text_or_null(earlier ? earlier->path : "")}};
+                     {"compared_with", text_or_null(earlier ? earlier->path : "")},
+                     {"identified_anew_with", text_or_null(arguments.config)}};
         written["verdict"] = assessment_json(analysis.assessed)["verdict"];
         std::cout << proto::json_text(written) << std::endl;
     }
@@ -175,6 +177,7 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
 
 std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
                               const estimator::Settings& settings, const std::string& frequencies,
+                              const std::string& anew_with, const Json& verdict,
                               const Json& prediction) {
     Json root;
     root["simulated"] = campaign.head.simulated;
@@ -182,6 +185,8 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
     root["campaign"] = campaign.head.name;
     root["started"] = report::utc_text(campaign.head.utc_ns);
     root["file"] = campaign.path;
+    root["identified_anew_with"] = text_or_null(anew_with);
+    root["verdict"] = verdict;
     root["model"] =
         "D = F + I aI + O aO + S aS + II aI^2 + OO aO^2 + SS aS^2 + IO aI aO + IS aI aS "
         "+ OS aO aS; a: specific force along input, output, spin axis, g";
@@ -191,6 +196,7 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
         list.push_back({{"name", estimator::parameter_names()[i]},
                         {"value", known ? Json(c.value[i]) : Json(nullptr)},
                         {"sigma", known ? Json(c.sigma[i]) : Json(nullptr)},
+                        {"u", known && c.combined ? Json(c.sigma[i]) : Json(nullptr)},
                         {"unit", estimator::parameter_unit(i)}});
     }
     root["coefficients"] = std::move(list);
@@ -216,15 +222,32 @@ std::string axes_line(const estimator::Settings& settings) {
     return text + printed("; drift sign %+d", settings.drift_sign);
 }
 
+/// What the coefficients rest on, and whether they can be believed.
+std::vector<std::string> notes_of(const CompensateArguments& arguments,
+                                  const estimator::uncertainty::Verdict& verdict,
+                                  const std::string& frequencies) {
+    std::vector<std::string> notes;
+    if (!arguments.config.empty())
+        notes.push_back("identified anew with " +
+                        proto::printable(arguments.config, proto::kLongestLine) +
+                        ", not as recorded");
+    notes.push_back("verdict: " + verdict.sentence);
+    if (!frequencies.empty()) notes.push_back(frequencies);
+    return notes;
+}
+
 /// For comments: what the numbers refer to, and what they predict.
-std::vector<std::string> comment_lines(const estimator::Settings& settings,
+std::vector<std::string> comment_lines(std::vector<std::string> lines,
+                                       const estimator::Settings& settings, bool combined,
                                        const report::Prediction& predicted,
                                        const CompensateArguments& arguments, double kappa) {
-    std::vector<std::string> lines{
-        axes_line(settings),
-        printed("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
-                arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
-                std::sqrt(2 * (kappa - 1)))};
+    lines.emplace_back(combined ? "sigma: the standard uncertainty u, of noise, drift of the "
+                                  "biases and declared inputs"
+                                : "sigma: of noise alone, the uncertainty was not assessed");
+    lines.push_back(axes_line(settings));
+    lines.push_back(printed("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
+                            arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                            std::sqrt(2 * (kappa - 1))));
     for (std::size_t k = 0; k < 3; ++k)
         lines.push_back(
             printed("gyro %c: drift %.6f, left after compensation 0 +- %.6f (1 sigma)%s", "xyz"[k],
@@ -261,7 +284,12 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
             " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
             "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
             " * with a the specific force along input, output and spin axis, g.\n";
-    for (const auto& line : comments) text += " * " + line + "\n";
+    for (auto line : comments) {
+        // Nor must a file's name.
+        for (auto at = line.find("*/"); at != std::string::npos; at = line.find("*/"))
+            line[at] = '_';
+        text += " * " + line + "\n";
+    }
     text += " */\n#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
     for (const bool sigma : {false, true}) {
         text += std::string("static const double vibrig_coefficient") + (sigma ? "_sigma" : "") +
@@ -279,9 +307,12 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
 }
 
 std::string coefficients_text(const report::Coefficients& c, const std::string& axes,
+                              const std::vector<std::string>& notes,
                               const report::Prediction& predicted,
                               const CompensateArguments& arguments, double kappa) {
-    std::string text = printed("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
+    // Beside the sigma of `identify`, which is of noise alone, it has its own name.
+    std::string text = printed("%-12s %12s %11s  %s\n", "coefficient", "value",
+                               c.combined ? "u" : "sigma", "unit");
     for (std::size_t i = 0; i < kParameters; ++i) {
         text += c.observable[i]
                     ? printed("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
@@ -290,6 +321,7 @@ std::string coefficients_text(const report::Coefficients& c, const std::string& 
                               "not determined", "-", estimator::parameter_unit(i));
     }
     text += "\n" + axes + "\n";
+    for (const auto& note : notes) text += note + "\n";
     text += printed("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
                     arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
                     std::sqrt(2 * (kappa - 1)));
@@ -358,9 +390,11 @@ int compensate(const CompensateArguments& arguments) {
     if (!arguments.config.empty()) record::forget_noise(campaign);
     const auto rig = rig_of(campaign, arguments.config);
     const estimator::Settings& settings = rig.estimator;
-    const auto replayed = record::replay(campaign, settings, {});
-    const auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
-                              record::shaken_of(campaign, rig));
+    auto replayed = record::replay(campaign, settings, {});
+    auto found = assess(settings, replayed.found, replayed.result, replayed.rows,
+                        record::shaken_of(campaign, rig));
+    doubt_replayed(settings, replayed, found.assessed.verdict);
+    const auto& verdict = found.assessed.verdict;
     const auto coefficients =
         report::combined(found.assessed, report::final_coefficients(campaign.path, replayed));
     const std::string frequencies = about_frequencies(campaign.path, found, level);
@@ -376,29 +410,29 @@ int compensate(const CompensateArguments& arguments) {
             campaign.path +
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
-    auto comments = comment_lines(settings, predicted, arguments, kappa);
-    if (!frequencies.empty()) comments.insert(comments.begin(), frequencies);
+    const auto notes = notes_of(arguments, verdict, frequencies);
+    auto comments =
+        comment_lines(notes, settings, coefficients.combined, predicted, arguments, kappa);
     const bool simulated = campaign.head.simulated;
     // In the header it has a comment of its own.
     if (simulated && arguments.format == "csv") comments.insert(comments.begin(), kSimulatedRig);
     const std::string text =
         arguments.format == "json"
-            ? coefficients_json(campaign, coefficients, settings, frequencies,
+            ? coefficients_json(campaign, coefficients, settings, frequencies, arguments.config,
+                                assessment_json(found.assessed)["verdict"],
                                 prediction_json(predicted, arguments, kappa))
         : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
         : arguments.format == "c"
             ? coefficients_header(campaign, coefficients, comments)
-            : simulated_line(simulated) +
-                  coefficients_text(
-                      coefficients,
-                      axes_line(settings) + (frequencies.empty() ? "" : "\n" + frequencies),
-                      predicted, arguments, kappa);
+            : simulated_line(simulated) + coefficients_text(coefficients, axes_line(settings),
+                                                            notes, predicted, arguments, kappa);
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {
         proto::write_output(arguments.output, text);
     }
-    return all ? 0 : kNo;
+    std::cerr << "verdict: " << verdict.sentence << '\n';
+    return all ? exit_status(verdict.level, false) : kNo;
 }
 
 }  // namespace
@@ -457,7 +491,8 @@ void add_reports(CLI::App& app, int& exit_code) {
                             "identify anew with these settings instead of the recorded ones");
     compensating.footer(
         "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
-        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
+        "Exit codes: 0 all 30 coefficients are determined and the result is valid or doubtful, 1 "
+        "some are\nnot, or it is not valid, 2 bad usage or input.");
 }
 
 }  // namespace vibrig::tool

@@ -239,13 +239,18 @@ class ReportAtARate : public ::testing::TestWithParam<double> {
         EXPECT_LT(squares / count, 1 + 4 * std::sqrt(2 / count));
         EXPECT_GT(squares / count, 0.2);
     }
-    void expect_printed(const std::string& page, const Bounds& bound) const {
+    void expect_printed(const std::string& page, const Bounds& bound, const Analysis& a) const {
         EXPECT_NE(
             page.find(fmt::format("{} dwells, {} samples", kDwells, kDwells * (readings() + 1))),
             std::string::npos);
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
             const auto cells = row_of(page, estimator::parameter_names()[i]);
             ASSERT_GT(cells.size(), 6U) << estimator::parameter_names()[i];
+            // Value and interval are those of the result, not of the noise alone.
+            const auto& c = a.assessed.coefficients[i];
+            EXPECT_NEAR(std::stod(cells[1]), c.value, 1e-6) << cells[0];
+            EXPECT_NEAR(std::stod(cells[3]), c.value - c.expanded, 1e-6) << cells[0];
+            EXPECT_NEAR(std::stod(cells[4]), c.value + c.expanded, 1e-6) << cells[0];
             EXPECT_NEAR(std::stod(cells[2]), bound[i], 0.05 * bound[i] + 1e-6) << cells[0];
             EXPECT_NEAR(std::stod(cells[6]), bound[i], 0.02 * bound[i] + 1e-6) << cells[0];
         }
@@ -272,13 +277,27 @@ class ReportAtARate : public ::testing::TestWithParam<double> {
 
 TEST_P(ReportAtARate, SaysWhatIsRightAtThatRate) {
     const auto campaign = record::read_campaign(folder_.string());
-    const Analysis analysis = analyse(campaign, {}, [](double) {});
+    Analysis analysis = analyse(campaign, {}, [](double) {});
     expect_lengths_and_vibration(campaign, analysis);
     const auto bound = bounds();
     expect_uncertainty(analysis, bound);
     expect_allan_deviation(analysis);
     expect_held_out(analysis);
-    expect_printed(make_page(campaign, analysis, {}), bound);
+    const std::string page = make_page(campaign, analysis, {});
+    expect_printed(page, bound, analysis);
+    EXPECT_EQ(page.find("identified anew"), std::string::npos);
+    EXPECT_NE(page.find("probability of about 95 %"), std::string::npos);
+    // Identified with other settings, it says with which, and has their coverage.
+    analysis.anew_with = "other.toml";
+    analysis.settings.uncertainty.coverage = 0.5;
+    const std::string anew = make_page(campaign, analysis, {});
+    EXPECT_NE(anew.find("identified anew with other.toml, not as recorded"), std::string::npos);
+    EXPECT_NE(anew.find("probability of about 50 %"), std::string::npos);
+    EXPECT_NE(anew.find("<th>50 % from</th>"), std::string::npos);
+    // Without an assessment the interval is the filter's, and the page says so.
+    analysis.assessed.done = false;
+    EXPECT_NE(make_page(campaign, analysis, {}).find("the filter's, of noise alone"),
+              std::string::npos);
 }
 
 INSTANTIATE_TEST_SUITE_P(Hz, ReportAtARate, ::testing::Values(40.0, 100.0, 1000.0),

@@ -153,9 +153,37 @@ TEST_F(Certificate, OfADoubtfulResultOrASimulatedRigSaysSoAcrossThePage) {
     EXPECT_THAT(doubtful, HasSubstr("biases walk"));
     campaign_.head.simulated = true;
     const std::string both = certificate_page(made());
-    EXPECT_THAT(both, HasSubstr("<span>SIMULATED</span>"));
+    EXPECT_THAT(both, HasSubstr("<span>SIMULATED</span><span>DOUBTFUL</span>"));
     EXPECT_THAT(both, HasSubstr("The result is DOUBTFUL"));
     EXPECT_TRUE(made()["simulated"]);
+}
+
+TEST_F(Certificate, SaysWhatWasEstimatedBesideTheCoefficientsAndWhatIsDeclaredOfMotion) {
+    EXPECT_THAT(certificate_page(made()), HasSubstr("Deviations from the method: none."));
+    result_["freed"] = {{{"class", "azimuth"},
+                         {"element", nullptr},
+                         {"value", -3.25},
+                         {"sigma", 0.5},
+                         {"unit", "arcmin"}}};
+    campaign_.head.configuration += "uncertainty.sync_motion = \"base\"\n";
+    result_["sync_motion_arcsec"] = 5.1;
+    const Json certificate = made();
+    ASSERT_EQ(certificate["deviations"].size(), 2U);
+    const std::string page = certificate_page(certificate);
+    EXPECT_THAT(page, HasSubstr("estimated beside the coefficients (estimator.free): azimuth, "
+                                "-3.25 +- 0.5 arcmin"));
+    EXPECT_THAT(page, HasSubstr("up to 5.1 arcsec, is rocking of the base"));
+    EXPECT_THAT(page, ::testing::Not(HasSubstr("Deviations from the method: none.")));
+}
+
+TEST_F(Certificate, ALimitStandsOnPaperAsTheStatementTookIt) {
+    issue_.limits = {{"D_Fx", 0.978999999, 1.0}, {"D_Ix", 0.979000001, {}}};
+    issue_.guard_band = 1;
+    const Json certificate = made();
+    EXPECT_EQ(certificate["statements"][1]["statement"], "inconclusive");
+    const std::string page = certificate_page(certificate);
+    EXPECT_THAT(page, HasSubstr("<td>0.978999999</td><td>1</td>"));
+    EXPECT_THAT(page, HasSubstr("<td>0.979000001</td><td>-</td>"));
 }
 
 TEST_F(Certificate, IsRefusedForWhatIsNotValid) {
