@@ -97,6 +97,9 @@ Variance analyse_variance(const std::vector<double>& value, const std::vector<do
                     (1 / of.weight + variance_within * of.weight_squared / squared(of.weight) +
                      squared(out.between.value));
     out.mean_sigma = std::sqrt(variance);
+    // A scatter is known no better than by the number of turn-ons, or of campaigns within them.
+    const Instability& dominant = out.between.value > 0 ? out.between : out.within;
+    if (dominant.value > 0) out.mean_dof = dominant.dof;
     return out;
 }
 
@@ -217,10 +220,7 @@ Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simul
         of.operating = found.within;
         of.shutdown = found.between;
         of.mean = found.mean;
-        // A scatter between turn-ons is known no better than by their number.
-        const double dof =
-            found.between.value > 0 ? found.between.dof : std::numeric_limits<double>::infinity();
-        const double half = student_quantile(0.95, dof) * found.mean_sigma;
+        const double half = student_quantile(0.95, found.mean_dof) * found.mean_sigma;
         of.mean_low = of.mean - half;
         of.mean_high = of.mean + half;
         trend.coefficients.push_back(std::move(of));

@@ -67,6 +67,7 @@ struct Trend {
 struct Variance {
     Instability within, between;
     double mean = 0, mean_sigma = 0;
+    double mean_dof = std::numeric_limits<double>::infinity();  ///< of mean_sigma
 };
 [[nodiscard]] Variance analyse_variance(const std::vector<double>& value,
                                         const std::vector<double>& u,

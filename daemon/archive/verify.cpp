@@ -134,6 +134,25 @@ void check_rows(const Entry& indexed, const fs::path& folder, const std::string&
     }
 }
 
+/// What went on later is marked so, and nothing else: it counts in no list and no history.
+void check_superseded(const std::vector<Entry>& entries, const std::string& index, Verified& to) {
+    for (const Entry& one : entries) {
+        if (one.hash.empty()) continue;
+        const bool went_on = std::ranges::any_of(entries, [&one](const Entry& later) {
+            return later.rig == one.rig && later.name == one.name &&
+                   later.started_utc_ns == one.started_utc_ns &&
+                   later.ended_utc_ns > one.ended_utc_ns;
+        });
+        if (one.superseded == went_on) continue;
+        to.findings.push_back(
+            {"index differs", one.key,
+             fmt::format("{}: result.superseded of {}: found {:d}, expected {:d}: {}", index,
+                         one.key, one.superseded, went_on,
+                         went_on ? "a later delivery of the campaign goes on from it"
+                                 : "no later delivery of the campaign is in the index")});
+    }
+}
+
 /// The files as the index has them, and as the manifest beside them has; whether they are so.
 bool check_copy(const Entry& entry, std::vector<File> files, const fs::path& folder, bool quick,
                 Verified& to) {
@@ -229,6 +248,7 @@ Verified verify(const Place& place, const std::string& recordings, const std::st
                 check_rows(*indexed, folder, index.name(), found);
         }
     }
+    check_superseded(entries, index.name(), found);
     for (const auto& folder : campaign_folders(place.folder, strange_in(place.folder, found))) {
         const std::string key = fs::path(folder).lexically_relative(place.folder).string();
         if (!keys.contains(key))

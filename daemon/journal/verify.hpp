@@ -21,7 +21,7 @@ struct Verdict {
 
 struct Expectation {
     std::vector<Anchor> anchors;  ///< heads it has to go through
-    std::string public_key;       ///< that has to have signed it, hex; empty: any
+    std::string public_key;       ///< that has to have signed it: hex, or fingerprint(); empty: any
     std::function<void(double part)> progress;
 };
 

@@ -73,16 +73,20 @@ Json amplitudes(const estimator::Result& result) {
     return list;
 }
 
-Json combinations(const estimator::Result& result) {
+Json combinations(const estimator::Result& result, const uncertainty::Assessment& assessed) {
     Json list = Json::array();
-    for (const estimator::Combination& combination : result.combinations) {
+    for (std::size_t i = 0; i < result.combinations.size(); ++i) {
+        const estimator::Combination& combination = result.combinations[i];
+        const bool known = i < assessed.combinations.size();
         Json weights = Json::object();
         for (const auto& [name, weight] : combination.weights) {
             weights[name] = number_or_null(weight);
         }
-        list.push_back({{"weights", std::move(weights)},
-                        {"value", number_or_null(combination.value)},
-                        {"sigma", number_or_null(combination.sigma)}});
+        list.push_back(
+            {{"weights", std::move(weights)},
+             {"value", number_or_null(known ? assessed.combinations[i].value : combination.value)},
+             {"sigma", number_or_null(combination.sigma)}});
+        if (known) list.back()["u"] = number_or_null(assessed.combinations[i].u);
     }
     return list;
 }
@@ -148,7 +152,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
     root["amplitudes"] = amplitudes(result);
-    root["combinations"] = combinations(result);
+    root["combinations"] = combinations(result, assessed);
     // No sample in the filter: there is no mean.
     root["nis"] = number_if(result.nis_per_dof > 0, result.nis_per_dof);
     root["samples"] = result.samples;

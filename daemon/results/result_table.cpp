@@ -83,7 +83,9 @@ std::string amplitude_lines(const estimator::Result& result) {
     return text;
 }
 
-std::string words(const estimator::Combination& combination) {
+/// `determined`: null where there is no assessment.
+std::string words(const estimator::Combination& combination,
+                  const estimator::uncertainty::Determined* determined) {
     std::string sum;
     for (const auto& [name, weight] : combination.weights) {
         const double size = std::abs(weight);
@@ -91,11 +93,15 @@ std::string words(const estimator::Combination& combination) {
         sum += (size == 1 ? "" : number("%.6g", size) + " ") + name;
     }
     const char* unit = combination.weights.empty() ? "" : unit_of(combination.weights[0].first);
-    return line("  %s = %s, sigma %s %s", sum.c_str(), number("%.6f", combination.value).c_str(),
-                number("%.6f", combination.sigma).c_str(), unit);
+    const std::string sigma = "sigma " + number("%.6f", combination.sigma);
+    if (determined == nullptr)
+        return line("  %s = %s, %s %s", sum.c_str(), number("%.6f", combination.value).c_str(),
+                    sigma.c_str(), unit);
+    return line("  %s = %s, u %s, %s %s", sum.c_str(), number("%.6f", determined->value).c_str(),
+                number("%.6f", determined->u).c_str(), sigma.c_str(), unit);
 }
 
-std::string not_observable(const estimator::Result& result) {
+std::string not_observable(const estimator::Result& result, const Assessment& assessed) {
     std::string names;
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         if (!result.observable[i]) {
@@ -107,9 +113,9 @@ std::string not_observable(const estimator::Result& result) {
         return text + "No combination of them is determined either.\n";
     }
     text += "Determined are these combinations of them:\n";
-    for (const estimator::Combination& combination : result.combinations) {
-        text += words(combination);
-    }
+    for (std::size_t i = 0; i < result.combinations.size(); ++i)
+        text += words(result.combinations[i],
+                      i < assessed.combinations.size() ? &assessed.combinations[i] : nullptr);
     return text;
 }
 
@@ -151,7 +157,7 @@ std::string result_table(const estimator::Result& result, const Assessment& asse
                 number("%g", estimator::CrossCheck::kLimit) + ")\n";
     }
     if (!all_observable(result)) {
-        text += "\n" + not_observable(result);
+        text += "\n" + not_observable(result, assessed);
     }
     text += "\n" + verdict(assessed);
     for (const std::string& warning : result.warnings) {

@@ -230,6 +230,7 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
     if (!spectrum.several()) return;
     const Analysis& of = spectrum.analysis;
     assessed.over_frequency = true;
+    assessed.combinations.clear();  // of the reference frequency's fit
     // It grows with the frequency.
     uncertainty::take_sync(spectrum.table.rows(), assessed);
     tell_coefficients(spectrum, settings.uncertainty, assessed);

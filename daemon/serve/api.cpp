@@ -85,7 +85,10 @@ EventQuery event_query(std::string_view query) {
         if (name == "after") {
             result.after = number;
         } else {
-            result.limit = std::clamp<std::uint64_t>(number, 1, kMostEvents);
+            if (number == 0 || number > kMostEvents)
+                throw std::invalid_argument("limit: found " + std::to_string(number) +
+                                            ", expected 1 to " + std::to_string(kMostEvents));
+            result.limit = number;
         }
     });
     return result;

@@ -396,8 +396,10 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
         amplitude.set_run(run.run);
         set(amplitude, &v1::RunAmplitude::set_amplitude_g, run.amplitude_g);
         set(amplitude, &v1::RunAmplitude::set_kappa, run.kappa);
-        set(amplitude, &v1::RunAmplitude::set_sigma_g, run.sigma_g);
-        set(amplitude, &v1::RunAmplitude::set_frequency_hz, run.frequency_hz);
+        // At rest there is neither.
+        if (run.sigma_g > 0) set(amplitude, &v1::RunAmplitude::set_sigma_g, run.sigma_g);
+        if (run.frequency_hz > 0)
+            set(amplitude, &v1::RunAmplitude::set_frequency_hz, run.frequency_hz);
     }
     for (const estimator::Combination& determined : result.combinations) {
         v1::Combination& combination = *out.add_combinations();
@@ -407,7 +409,8 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
         set(combination, &v1::Combination::set_value, determined.value);
         set(combination, &v1::Combination::set_sigma, determined.sigma);
     }
-    set(out, &v1::Parameters::set_nis, result.nis_per_dof);
+    // No sample in the filter: there is no mean.
+    if (result.nis_per_dof > 0) set(out, &v1::Parameters::set_nis, result.nis_per_dof);
     out.set_samples(result.samples);
     out.set_rejected(result.rejected);
     for (const std::string& warning : result.warnings) out.add_warnings(proto::mend_utf8(warning));

@@ -2,7 +2,9 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "estimator/identification/identification_impl.hpp"
 
@@ -10,6 +12,30 @@ namespace vibrig::estimator {
 namespace {
 
 constexpr double kHannNoiseBandwidth = 1.5;
+
+/// Of dwells at one vibration, or at rest, kappa is the same but for the rig's scatter.
+constexpr double kOneLevelOfRun = 1.25;
+
+/// Least and largest amplitude of a run whose dwells are at several levels of one vibration.
+std::optional<std::pair<double, double>> several_levels(const std::vector<DwellSummary>& dwells,
+                                                        int run) {
+    constexpr double kOneFrequency = 1.01;
+    double least = 0, largest = 0, least_hz = 0, largest_hz = 0;
+    for (const DwellSummary& d : dwells) {
+        // Neither random vibration nor a sweep has a line.
+        const bool sine = d.frequency_hz > 0;
+        if (d.run != run || d.used == 0 || !(sine || d.kappa - 1 < VibrationLevel::kAtRest))
+            continue;
+        least = least > 0 ? std::min(least, d.kappa) : d.kappa;
+        largest = std::max(largest, d.kappa);
+        if (!sine) continue;
+        least_hz = least_hz > 0 ? std::min(least_hz, d.frequency_hz) : d.frequency_hz;
+        largest_hz = std::max(largest_hz, d.frequency_hz);
+    }
+    if (largest <= kOneLevelOfRun * least || largest_hz > kOneFrequency * least_hz) return {};
+    const auto amplitude = [](double kappa) { return std::sqrt(2.0 * std::max(0.0, kappa - 1.0)); };
+    return std::pair{amplitude(least), amplitude(largest)};
+}
 
 /// Per run: mean over its dwells; sigma from accelerometer noise with the gain calibrated by
 /// gravity, sigma_a sqrt((2 + a0^2) / n), and from the scatter of the dwells.
@@ -38,7 +64,10 @@ std::vector<RunAmplitude> amplitudes_of(const std::vector<DwellSummary>& dwells,
         }
         if (n == 0) continue;
         run.kappa = kappa / n;
-        run.amplitude_g = std::sqrt(2.0 * std::max(0.0, run.kappa - 1.0));
+        // A mean of levels is none that there was.
+        run.amplitude_g = several_levels(dwells, number)
+                              ? std::numeric_limits<double>::quiet_NaN()
+                              : std::sqrt(2.0 * std::max(0.0, run.kappa - 1.0));
         run.frequency_hz = vibrating > 0 ? frequency / vibrating : 0.0;
         if (run.amplitude_g > 0) {
             const double scatter =
@@ -238,12 +267,19 @@ Result Identification::Impl::result() const {
     out.combinations =
         determined_combinations(solution.found, solution.covariance, solution.value, prior);
     out.amplitudes = amplitudes_of(dwells, settings.accelerometer_g);
+    out.warnings = dwell_warnings(dwells);
+    for (const RunAmplitude& run : out.amplitudes)
+        if (const auto levels = several_levels(dwells, run.run))
+            out.warnings.push_back("run " + std::to_string(run.run) + ": found dwells from " +
+                                   std::to_string(levels->first) + " to " +
+                                   std::to_string(levels->second) +
+                                   " g under one run number, expected one level: no amplitude is "
+                                   "given; coefficients take each dwell with its own");
     out.nis_per_dof = nis_count > 0 ? nis_sum / (3.0 * static_cast<double>(nis_count)) : 0.0;
     out.samples = samples;
     out.rejected = rejected;
     out.dwells = dwells;
     out.rows = without_apart(rows);
-    out.warnings = dwell_warnings(dwells);
     if (settings.method == Method::two_step) {
         std::map<int, KappaSpread> levels;
         for (const RunFilter& filter : filters) {

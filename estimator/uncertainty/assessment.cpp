@@ -228,6 +228,17 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+void tell_combinations(const Result& result, const VectorXd& value, const MatrixXd& combined,
+                       Assessment& out) {
+    for (const Combination& one : result.combinations) {
+        VectorXd w = VectorXd::Zero(kAll);
+        for (const auto& [name, weight] : one.weights)
+            for (std::size_t i = 0; i < kParameters; ++i)
+                if (name == parameter_names()[i]) w[index(internal_of(i))] = weight;
+        out.combinations.push_back({w.dot(value), std::sqrt(w.dot(combined * w))});
+    }
+}
+
 void tell_coefficients(const Settings& settings, const Result& result, const DwellTable& table,
                        const NullFit& fit, const Together& all, const TypeB& b, Assessment& out) {
     const MatrixXd combined = all.covariance + b.covariance;
@@ -241,6 +252,7 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
             out.covariance_combined(index(i), index(j)) = both ? combined(a, c) : kNone;
         }
     }
+    tell_combinations(result, all.value, combined, out);
     std::vector<double> widening;
     for (std::size_t i = 0; i < kParameters; ++i) {
         const std::size_t internal = internal_of(i);

@@ -81,6 +81,11 @@ struct CrossAxis {
     LevelTensor gamma = kVertical;  ///< mean over its vibrating dwells
 };
 
+/// Of a combination of what is not determined one by one: as Coefficient.
+struct Determined {
+    double value = kNone, u = kNone;
+};
+
 /// Everything that follows from the rows of a campaign's dwells.
 struct Assessment {
     bool done = false;            ///< there were rows to work on
@@ -88,6 +93,7 @@ struct Assessment {
     std::array<Coefficient, kParameters> coefficients;  ///< order of parameter_names()
     /// Type A, and with the declared inputs: 30 x 30, order of parameter_names().
     Eigen::MatrixXd covariance_a, covariance_combined;
+    std::vector<Determined> combinations;  ///< as Result::combinations; over frequency none
     Verdict verdict;
     double chi_square = 0, p = kNone;
     int degrees = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/linear_algebra.hpp"
@@ -185,6 +187,7 @@ void check(const Inputs& inputs) {
     });
     const auto n = static_cast<Index>(names.size());
     MatrixXd r = MatrixXd::Identity(n, n);
+    std::set<std::pair<Index, Index>> pairs;
     for (const Correlation& c : inputs.correlations) {
         const auto at = [&](const std::string& name) {
             const auto found = std::find(names.begin(), names.end(), name);
@@ -199,6 +202,9 @@ void check(const Inputs& inputs) {
             throw SettingsError("uncertainty.correlation: found " + std::to_string(c.value) +
                                 " of '" + c.first + "' with '" + c.second +
                                 "', expected two inputs and a number from -1 to 1");
+        if (!pairs.insert(std::minmax(a, b)).second)
+            throw SettingsError("uncertainty.correlation: found '" + c.first + "' with '" +
+                                c.second + "' twice, expected each pair once");
         r(a, b) = r(b, a) = c.value;
     }
     const double least = linear_algebra::symmetric_eigenvalues(r)[0];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "estimator/filter/parameters.hpp"
 #include "estimator/filter/text.hpp"
@@ -275,16 +276,51 @@ void add_dwells(const Result& result, Noticed wanted, std::vector<Reason>& list)
     list.push_back(std::move(first));
 }
 
+/// "28 of 28 are rejected: no samples", with the most frequent reason; empty: fewer than half are,
+/// and what is missing is missing for another one.
+std::string words_of_rejected(const Result& result) {
+    std::map<std::string, std::size_t> reasons;
+    std::size_t rejected = 0;
+    double force_g = 0;
+    for (const DwellSummary& d : result.dwells) {
+        if (!d.left_out) continue;
+        ++rejected;
+        ++reasons[d.reason];
+        force_g += d.mean_force_g;
+    }
+    if (rejected == 0 || 2 * rejected < result.dwells.size()) return {};
+    const auto most =
+        std::ranges::max_element(reasons, {}, [](const auto& reason) { return reason.second; });
+    std::string words = text("%zu of %zu are rejected, ", rejected, result.dwells.size()) +
+                        (most->second < rejected ? text("%zu of them: ", most->second) : "") +
+                        most->first;
+    force_g /= static_cast<double>(rejected);
+    constexpr double kGravity = 9.8;
+    if (std::abs(force_g / kGravity - 1) < 0.02)
+        words += text(" (it is %.2f: are the forces in m/s^2?)", force_g);
+    return words;
+}
+
 void add_observability(const Result& result, std::vector<Reason>& list) {
     std::string names;
     for (std::size_t i = 0; i < kParameters; ++i) {
         if (!result.observable[i])
             names += std::string(names.empty() ? "" : " ") + parameter_names()[i];
     }
-    if (!names.empty())
+    if (names.empty()) return;
+    const std::string rejected = words_of_rejected(result);
+    if (result.rows.empty() && !result.dwells.empty()) {
+        list.push_back(
+            {"not observable",
+             "no dwell is left to determine coefficients from: " +
+                 (rejected.empty() ? "all are held out or of another vibration" : rejected),
+             Level::not_valid});
+    } else {
         list.push_back({"not observable",
-                        "these positions and levels do not determine one by one " + names,
+                        "these positions and levels do not determine one by one " + names +
+                            (rejected.empty() ? "" : "; of the dwells, " + rejected),
                         Level::not_valid});
+    }
 }
 
 void add_cross_check(const CrossCheck& check, std::vector<Reason>& list) {

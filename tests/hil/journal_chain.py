@@ -55,6 +55,13 @@ def whole(checks, rig, journal):
     code, verdict = journal.verify()
     checks.check(code == 0 and verdict["found"] == [], "a running daemon's journal verifies", str(verdict))
     checks.equal(verdict["public_key"], status["journal"]["public_key"], "with the key that the status names")
+    for stated in (verdict["public_key"], verdict["fingerprint"]):
+        code, found = journal.verify("--key", stated)
+        checks.check(code == 0, "which may be stated in full, or by its fingerprint", str(found))
+    another = "SHA256:0123456789abcdef"
+    code, found = journal.verify("--key", another)
+    checks.check(code == 1 and found["found"] == [f"is signed with {verdict['fingerprint']}, expected {another}"],
+                 "another one has not signed it", str(found))
     key = os.stat(journal.path + ".key")
     checks.equal(key.st_mode & 0o777, 0o600, "which the daemon alone can read")
     tested = json.loads(rig.tool("selftest", "--json").stdout)

@@ -179,7 +179,9 @@ printf('%d %d %d %s %s %d\\n', rows(c.samples.force_g), columns(c.samples.force_
 printf('%.17g ', d, u, c.coefficients.value, c.coefficients.u, mean(c.samples.force_g), c.conditions.temperature_c(end), all(ok));
 try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end
 c.result.spectrum.model = 'resonance'; vibrig.compensation(c, [45 10 90]);
-try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', e.message); end"""
+try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', e.message); end
+c.coefficients.observable(1) = false; c.coefficients.value(1) = NaN; c.coefficients.covariance(1, :) = NaN; c.coefficients.covariance(:, 1) = NaN;
+[d, u, ok] = vibrig.compensation(c, [45 10 90]); printf('\\n%d', isnan(d), isnan(u), ok);"""
     run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval", script], capture_output=True, text=True, timeout=120,
                          env={**os.environ, "RECORDING": str(campaign.folder)})
     lines = run.stdout.splitlines() + ["", "", "", ""]
@@ -190,6 +192,7 @@ try, vibrig.compensation(c, [45 10 90], 'table_g', 9); catch e, printf('\\n%s', 
     found = [float(x) for x in lines[1].split()]
     checks.check(len(found) == len(expected) and np.allclose(found, expected, rtol=1e-9), "with the same numbers", run.stdout + run.stderr)
     checks.check("expected a campaign's HDF5 file or its folder" in lines[2], "and says what it did not find", run.stderr)
+    checks.equal(lines[4:10] + lines[10:13], list("100100011"), "what is not determined foretells nothing")
     checks.check("expected a level of 0" in lines[3], "and what its coefficients do not foretell", run.stdout + run.stderr)
 
 

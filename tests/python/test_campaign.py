@@ -38,14 +38,41 @@ def test_frames_have_utc_and_a_column_for_each_number(campaign):
 
 def test_coefficients_with_covariance(campaign):
     found = campaign.coefficients
-    assert found["D_Fx"] == vibrig.Coefficient("D_Fx", -1.0, found.sigma[0], "deg/h", True, found.u[0])
-    assert np.allclose(found.u[:29], found.sigma[:29]) and np.isnan(found.u[29])   # no result: the filter's covariance
+    one = found["D_Fx"]
+    assert (one.name, one.value, one.sigma, one.unit, one.observable) == ("D_Fx", -1.0, found.sigma[0], "deg/h", True)
+    # No result: the filter's covariance, which is noise alone and no uncertainty.
+    assert np.isnan(one.u) and np.all(np.isnan(found.u)) and np.allclose(np.diag(found.covariance)[:29], found.sigma[:29]**2)
     assert not found["D_OSz"].observable and np.isnan(found["D_OSz"].value)
     assert np.all(np.isnan(found.covariance[29])) and np.all(np.isnan(found.covariance[:, 29]))
     assert np.allclose(np.diag(found.correlation)[:29], 1)
     assert found.frame().loc["D_IIy", "unit"] == "deg/h/g^2"
     with pytest.raises(KeyError, match="expected one of D_Fx"):
         found["D_t"]
+
+
+def of_result(key):
+    parameters = [{"name": name, "value": 1.0, "sigma": 0.1, "observable": name != "D_OSz"} for name in vibrig.Coefficients.names]
+    covariance = [[0.04 if i == j < 29 else None if 29 in (i, j) else 0.0 for i in range(30)] for j in range(30)]
+    return vibrig.Coefficients.of_result({"parameters": parameters, key: covariance})
+
+
+def test_uncertainty_is_the_results_alone():
+    assert np.allclose(of_result("covariance_combined").u[:29], 0.2) and np.isnan(of_result("covariance_combined").u[29])
+    live = of_result("covariance")   # as /api/v1/parameters has it
+    assert np.all(np.isnan(live.u)) and np.isnan(live["D_Fx"].u) and live["D_Fx"].sigma == 0.1
+    assert live.covariance[0, 0] == 0.04 and live.correlation[0, 0] == pytest.approx(1)
+
+
+def test_what_is_not_determined_foretells_nothing():
+    # D_OSz is null: where output or spin axis of gyro z lies level it does not count, else neither number is known.
+    axes = [["+x", "+y", "+z"], ["+y", "+z", "+x"], ["+z", "+x", "+y"]]
+    found = of_result("covariance_combined")
+    level = found.drift(np.array([0.0, 1.0, 0.0]), 19.0, axes)
+    assert level.determined.all() and level.drift_dph[2] == pytest.approx(1 + 1 + 19)
+    assert level.residual_dph[2] == pytest.approx(0.2 * np.sqrt(1 + 1 + 19**2))
+    leaning = found.drift(np.array([0.6, 0.8, 0.0]), 19.0, axes)
+    assert list(leaning.determined) == [True, True, False] and np.all(np.isfinite(leaning.residual_dph[:2]))
+    assert np.isnan(leaning.drift_dph[2]) and np.isnan(leaning.residual_dph[2])
 
 
 def test_compensation_by_hand(campaign):

@@ -5,7 +5,8 @@ function [drift, residual, determined] = compensation(campaign, attitude_deg, va
 %
 %   ATTITUDE_DEG are gimbal angles outer, inner, azimuth (no encoder readings); 'table_g' or 'platform_g' the peak of the
 %   vibration, neither: at rest. DRIFT and RESIDUAL (1 sigma) are deg/h about the input axes of gyros x, y, z (3 x 1), as `vibrig compensate`
-%   gives them. Quadratic coefficients that depend on the frequency foretell no vibration: then the level must be 0.
+%   gives them, and NaN where not DETERMINED by the data. Quadratic coefficients that depend on the frequency foretell no
+%   vibration: then the level must be 0.
 %   They are h.D and sqrt(h'Ph) of Tang et al. 2009, eqs 8-9 with k1 = 1, k2 = 1 + a^2 / 2.
 if numel(attitude_deg) ~= 3 || ~all(isfinite(attitude_deg))
   error('vibrig:argument', 'attitude_deg: expected three angles, deg');
@@ -32,19 +33,18 @@ ry = [cosd(b) 0 sind(b); 0 1 0; -sind(b) 0 cosd(b)];
 rz = [cosd(g) -sind(g) 0; sind(g) cosd(g) 0; 0 0 1];
 up = rz * ry * rx * axis_of(value_of(campaign, 'platform.up'));
 of = campaign.coefficients;
-% What is not determined counts nothing here; `determined` says where it would.
-value = of.value; value(~of.observable) = 0;
-covariance = of.covariance; covariance(isnan(covariance)) = 0;
-drift = zeros(3, 1); residual = zeros(3, 1); determined = true(3, 1);
+drift = nan(3, 1); residual = nan(3, 1); determined = true(3, 1);
 gyros = 'xyz';
 for gyro = 1:3
   names = value_of(campaign, ['platform.gyro_' gyros(gyro) '_axes']);
   i = axis_of(names{1})' * up; o = axis_of(names{2})' * up; s = axis_of(names{3})' * up;
   h = [1; i; o; s; kappa * [i^2; o^2; s^2; i * o; i * s; o * s]];
-  own = 10 * (gyro - 1) + (1:10);
-  determined(gyro) = all(of.observable(own) | abs(h) <= 1e-9);
-  drift(gyro) = h' * value(own);
-  residual(gyro) = sqrt(max(0, h' * covariance(own, own) * h));
+  own = 10 * (gyro - 1) + find(abs(h) > 1e-9);
+  h = h(abs(h) > 1e-9);
+  determined(gyro) = all(of.observable(own));
+  if ~determined(gyro), continue, end
+  drift(gyro) = h' * of.value(own);
+  residual(gyro) = sqrt(max(0, h' * of.covariance(own, own) * h));
 end
 end
 

@@ -8,8 +8,9 @@ function campaign = open(path)
 %     c.samples, c.orders, c.dwells, c.estimates, c.conditions, c.events, c.gaps
 %     c.units.samples.force_g      unit of a column, where the file has one
 %     c.coefficients               names, unit, value, u, sigma (30 x 1), covariance (30 x 30), observable; after the last
-%                                  dwell; NaN: not determined; u is the standard uncertainty, by the covariance; sigma the
-%                                  filter's noise alone, over frequency that of the reference frequency's fit
+%                                  dwell; NaN: not determined; u is the standard uncertainty, by the result's combined
+%                                  covariance (NaN without one: covariance is of noise alone then); sigma the filter's noise
+%                                  alone, over frequency that of the reference frequency's fit
 %     c.verdict                    of the result; [] without one
 %     c.result, c.plan, c.interlocks, c.configuration (text), c.state, c.name
 %
@@ -74,14 +75,15 @@ gyros = 'xyz';
 for gyro = 1:3
   for k = 1:10, c.names{10 * (gyro - 1) + k} = ['D_' terms{k} gyros(gyro)]; end
 end
-c.value = nan(30, 1); c.sigma = nan(30, 1); c.covariance = nan(30, 30); c.observable = false(30, 1);
+c.value = nan(30, 1); c.sigma = nan(30, 1); c.u = nan(30, 1); c.covariance = nan(30, 30); c.observable = false(30, 1);
 if isempty(campaign.dwells.time_ns), return, end
 seen = campaign.dwells.observable(end, :)' ~= 0;
 c.observable = seen;
 value = campaign.dwells.value(end, :)'; sigma = campaign.dwells.sigma(end, :)';
 covariance = reshape(campaign.dwells.covariance(end, :, :), 30, 30);
-if isfield(campaign.result, 'covariance_combined') && isnumeric(campaign.result.covariance_combined) ...
-    && isequal(size(campaign.result.covariance_combined), [30 30])
+combined = isfield(campaign.result, 'covariance_combined') && isnumeric(campaign.result.covariance_combined) ...
+    && isequal(size(campaign.result.covariance_combined), [30 30]);
+if combined
   % The result's own, with drift states and declared inputs.
   covariance = campaign.result.covariance_combined;
   for i = 1:30
@@ -90,5 +92,5 @@ if isfield(campaign.result, 'covariance_combined') && isnumeric(campaign.result.
   end
 end
 c.value(seen) = value(seen); c.sigma(seen) = sigma(seen); c.covariance(seen, seen) = covariance(seen, seen);
-c.u = sqrt(diag(c.covariance));
+if combined, c.u = sqrt(diag(c.covariance)); end
 end

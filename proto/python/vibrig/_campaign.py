@@ -205,8 +205,8 @@ class Campaign:
 
     @property
     def coefficients(self) -> Coefficients:
-        """Of the result, with its combined covariance; without one the filter's after the last dwell. Raises ValueError when
-        there is no dwell."""
+        """Of the result, with its combined covariance; without one the filter's after the last dwell, which is of noise alone
+        (`u` is NaN). Raises ValueError when there is no dwell."""
         dwells = self.dwells
         if dwells.rows == 0:
             raise ValueError(f"{self.parts[0]}: found no finished dwell, expected one")

@@ -111,7 +111,8 @@ class Client:
         return self._object("/api/v1/parameters")
 
     def coefficients(self) -> Coefficients:
-        """Of the result so far. Raises ValueError while there is none."""
+        """Of the result so far, by the filter's noise alone: `u` is NaN, a finished campaign's result has it. Raises
+        ValueError while there is none."""
         result = self.parameters()
         if not result.get("parameters"):
             raise ValueError("parameters: found none yet, expected 30")

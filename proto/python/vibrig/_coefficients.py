@@ -21,8 +21,9 @@ UNITS: tuple[str, ...] = tuple("deg/h" if term == "F" else "deg/h/g" if len(term
 class Coefficient:
     """One coefficient; `value`, `sigma` and `u` in `unit`, NaN if the data do not determine it.
 
-    `u`: its standard uncertainty, by the covariance; `sigma`: the filter's noise alone, over frequency that of the
-    reference frequency's fit, which may be the larger one.
+    `u`: its standard uncertainty, by the result's combined covariance, NaN where there is none (a campaign that runs, an
+    interrupted one); `sigma`: the filter's noise alone, over frequency that of the reference frequency's fit, which may be
+    the larger one.
     """
 
     name: str
@@ -40,7 +41,9 @@ class Drift:
     drift_dph: Array
     """Without compensation."""
     residual_dph: Array
-    """1 sigma of what is left after compensation, by the coefficients' covariance."""
+    """1 sigma of what is left after compensation, by the coefficients' covariance.
+
+    Drift and residual are NaN where not determined."""
     determined: npt.NDArray[np.bool_]
     """False: it rests on coefficients that the data do not determine."""
 
@@ -48,14 +51,17 @@ class Drift:
 class Coefficients(Mapping[str, Coefficient]):
     """By name, in the order of `names` (F I O S II OO SS IO IS OS of gyro x, then y, z; IEEE Std 517).
 
-    `value`, `sigma` (the filter's noise alone), `u` (standard uncertainty, by the covariance): (30,), NaN where not
-    observable; `covariance`: (30, 30) in products of `units`, NaN there too; `observable`: (30,) bool.
+    `value`, `sigma` (the filter's noise alone), `u` (standard uncertainty, NaN also where the covariance is not a result's
+    combined one): (30,), NaN where not observable; `covariance`: (30, 30) in products of `units`, NaN there too;
+    `observable`: (30,) bool.
     """
 
     names = NAMES
     units = UNITS
 
-    def __init__(self, value: Array, sigma: Array, covariance: Array, observable: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, value: Array, sigma: Array, covariance: Array, observable: npt.NDArray[np.bool_],
+                 combined: bool = False) -> None:
+        """`combined`: `covariance` is of noise, drift states and declared inputs; else of noise alone."""
         for what, array, shape in (("value", value, (30,)), ("sigma", sigma, (30,)),
                                    ("covariance", covariance, (30, 30)), ("observable", observable, (30,))):
             if array.shape != shape:
@@ -65,14 +71,15 @@ class Coefficients(Mapping[str, Coefficient]):
         self.value: Array = np.where(self.observable, value, np.nan)
         self.sigma: Array = np.where(self.observable, sigma, np.nan)
         self.covariance: Array = np.where(both, covariance, np.nan)
-        self.u: Array = np.sqrt(np.diag(self.covariance))
-        self._raw = value, covariance
+        self._spread: Array = np.sqrt(np.diag(self.covariance))
+        self.u: Array = self._spread if combined else np.full(30, np.nan)
 
     @classmethod
     def of_result(cls, result: Mapping[str, Any]) -> Coefficients:
         """Of result.json, `vibrig identify --json`, or /api/v1/parameters. Raises KeyError, ValueError.
 
-        `covariance` is the combined one (noise, drift states, declared inputs) where the result has it.
+        `covariance` is the combined one (noise, drift states, declared inputs) where the result has it, else of noise
+        alone, as in all of /api/v1/parameters; then `u` is NaN.
         """
         parameters = result["parameters"]
         names = tuple(p["name"] for p in parameters)
@@ -85,7 +92,7 @@ class Coefficients(Mapping[str, Coefficient]):
         return cls(np.array([number(p.get("value")) for p in parameters]),
                    np.array([number(p.get("sigma")) for p in parameters]),
                    np.array(covariance) if covariance else np.full((30, 30), np.nan),
-                   np.array([bool(p.get("observable")) for p in parameters]))
+                   np.array([bool(p.get("observable")) for p in parameters]), bool(result.get("covariance_combined")))
 
     def __getitem__(self, name: str) -> Coefficient:
         if name not in NAMES:
@@ -103,7 +110,7 @@ class Coefficients(Mapping[str, Coefficient]):
     @property
     def correlation(self) -> Array:
         """(30, 30), NaN where not observable."""
-        correlation: Array = self.covariance / np.outer(self.u, self.u)
+        correlation: Array = self.covariance / np.outer(self._spread, self._spread)
         return correlation
 
     def frame(self) -> Any:
@@ -119,7 +126,6 @@ class Coefficients(Mapping[str, Coefficient]):
         `up`: (3,) specific force at rest in platform axes, g; `kappa` = 1 + a^2 / 2 with a in g at the platform;
         `axes`: input, output, spin of each gyro as signed platform axes ("+x").
         """
-        value, covariance = self._raw
         drift, residual, determined = np.zeros(3), np.zeros(3), np.ones(3, dtype=bool)
         for gyro, names in enumerate(axes):
             a_i, a_o, a_s = (signed_axis(name) @ up for name in names)
@@ -127,9 +133,15 @@ class Coefficients(Mapping[str, Coefficient]):
                                                                   a_o * a_s))])
             own = slice(10 * gyro, 10 * gyro + 10)
             observable = self.observable[own]
-            determined[gyro] = bool(np.all(observable | (np.abs(h) <= 1e-9)))
-            drift[gyro] = h @ value[own]
-            residual[gyro] = math.sqrt(max(0.0, h @ covariance[own, own] @ h))
+            counts = np.abs(h) > 1e-9
+            determined[gyro] = bool(np.all(observable[counts]))
+            if not determined[gyro]:
+                drift[gyro] = residual[gyro] = math.nan
+                continue
+            # The others may be NaN, and 0 times NaN is none.
+            h = h[counts]
+            drift[gyro] = h @ self.value[own][counts]
+            residual[gyro] = math.sqrt(max(0.0, h @ self.covariance[own, own][np.ix_(counts, counts)] @ h))
         return Drift(drift, residual, determined)
 
 

@@ -77,6 +77,39 @@ TEST(Trend, FindsTheInstabilitiesThatAreThere) {
     EXPECT_GT(found_shutdown, 0.9);
 }
 
+/// Share of the 95 % intervals of the mean that have it.
+double coverage(std::size_t groups, std::size_t each, double operating, double shutdown) {
+    constexpr int kTrials = 2000;
+    std::mt19937 random(kSeed);
+    int within = 0;
+    for (int i = 0; i < kTrials; ++i) {
+        const Drawn of = draw(random, groups, each, operating, shutdown);
+        std::vector<Entry> history;
+        for (std::size_t k = 0; k < of.value.size(); ++k) {
+            Entry one = entry_of("0017", 0);
+            one.coefficients = {};
+            one.coefficients[0] = Coefficient{of.value[k], of.u[k], of.u[k], of.u[k], 0, {}};
+            const std::size_t hour = 48 * of.group[k] + 3 * k;
+            one.started_utc_ns += static_cast<std::int64_t>(hour) * kHour_ns;
+            one.ended_utc_ns = one.started_utc_ns + kHour_ns;
+            history.push_back(one);
+        }
+        const Trend trend = trend_of(history, kShutdownAfterH, false);
+        const CoefficientTrend& c = trend.coefficients.at(0);
+        within += c.mean_low <= 3 && 3 <= c.mean_high;
+    }
+    return static_cast<double>(within) / kTrials;
+}
+
+TEST(Trend, TheMeansIntervalCoversAlsoWhereAFewCampaignsTellTheInstability) {
+    constexpr double kLarge = 20 * kU;  // so that it shows in each history
+    for (const std::size_t campaigns : {2U, 3U, 5U, 10U})
+        EXPECT_NEAR(coverage(1, campaigns, kLarge, 0), 0.95, 0.03)
+            << campaigns << " seed " << kSeed;
+    EXPECT_NEAR(coverage(3, 1, 0, kLarge), 0.95, 0.03);
+    EXPECT_NEAR(coverage(1, 5, 0, 0), 0.96, 0.04) << "nothing beyond the uncertainties";
+}
+
 TEST(Trend, PausesAreShutdowns) {
     std::vector<Entry> campaigns{entry_of("1", 0), entry_of("1", 0), entry_of("1", 1)};
     campaigns[1].started_utc_ns = campaigns[0].ended_utc_ns + kHour_ns;

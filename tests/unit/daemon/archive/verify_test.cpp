@@ -57,6 +57,17 @@ TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
             "\"1700001000000000000\"");
 }
 
+TEST_F(Verify, NamesACampaignThatCountsNowhereThoughNothingWentOnFromIt) {
+    add();
+    edit("UPDATE result SET superseded = 1");
+    const std::string words =
+        "index differs: " + place().index + ": result.superseded of rig/test-1: ";
+    EXPECT_THAT(found(true), ElementsAre(words + "found 1, expected 0: no later delivery of the "
+                                                 "campaign is in the index"));
+    static_cast<void>(deliver((lab() / "rig" / "test-1").string(), place(), "rig", {}));
+    EXPECT_THAT(found(), IsEmpty());
+}
+
 TEST_F(Verify, SaysOnceOfWhichCampaignTheVibrationIsNotNoted) {
     add();
     edit("UPDATE coefficient SET at_hz = NULL");

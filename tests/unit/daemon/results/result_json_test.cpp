@@ -115,6 +115,11 @@ TEST(ResultJson, WhatIsNotObservableOrDoesNotExistIsNullAndNeverNaN) {
     // and the combination is there, weights in the order given
     EXPECT_EQ(root["combinations"][0].dump(),
               R"({"weights":{"D_Fx":1.0,"D_OOx":19.0},"value":1.57,"sigma":0.004})");
+    // with an assessment its value and uncertainty beside the filter's noise
+    estimator::uncertainty::Assessment assessed;
+    assessed.combinations.push_back({1.6, 0.02});
+    EXPECT_EQ(Json::parse(result_json(result, assessed))["combinations"][0].dump(),
+              R"({"weights":{"D_Fx":1.0,"D_OOx":19.0},"value":1.6,"sigma":0.004,"u":0.02})");
     EXPECT_FALSE(all_observable(result));
     EXPECT_TRUE(all_observable(complete()));
 }

@@ -26,5 +26,16 @@ TEST(ResultTable, OnlyATableThatDoesNotVibrateIsAtRest) {
     EXPECT_THAT(row_of(19, 0), HasSubstr(" no line"));
 }
 
+TEST(ResultTable, ACombinationHasTheUncertaintyOfTheAssessment) {
+    estimator::Result result;
+    result.combinations.push_back({{{"D_Fx", 1}, {"D_OOx", 19}}, 1.57, 0.004});
+    EXPECT_THAT(result_table(result, {}),
+                HasSubstr("D_Fx + 19 D_OOx = 1.570000, sigma 0.004000 deg/h"));
+    estimator::uncertainty::Assessment assessed;
+    assessed.combinations.push_back({1.6, 0.02});
+    EXPECT_THAT(result_table(result, assessed),
+                HasSubstr("D_Fx + 19 D_OOx = 1.600000, u 0.020000, sigma 0.004000 deg/h"));
+}
+
 }  // namespace
 }  // namespace vibrig::tool

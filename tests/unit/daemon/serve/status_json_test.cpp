@@ -217,6 +217,16 @@ TEST(StatusJson, WritesNullWhereTheCovarianceIsNotDetermined) {
     EXPECT_TRUE(carries(json, "[null,1,0")) << json.substr(0, 6000);
 }
 
+TEST(StatusJson, OfARunAtRestAndOfNoSampleThereIsNoNumber) {
+    estimator::Result result;
+    EXPECT_FALSE(parsed<v1::Parameters>(parameters_json(result)).has_nis());
+    result.amplitudes.push_back({2, 0, 1, 0, 0});
+    const auto run = parsed<v1::Parameters>(parameters_json(result)).amplitudes(0);
+    EXPECT_TRUE(run.has_amplitude_g());
+    EXPECT_FALSE(run.has_sigma_g());
+    EXPECT_FALSE(run.has_frequency_hz());
+}
+
 TEST(StatusJson, EveryEnumValueHasItsName) {
     StatusData data = full_status();
     for (int i = 0; i <= static_cast<int>(CampaignState::tripped); ++i) {

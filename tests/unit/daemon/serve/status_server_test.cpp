@@ -58,7 +58,7 @@ TEST_F(Server, GivesEventsAfterAnId) {
     EXPECT_NE(some.find("event 4"), std::string::npos);
     EXPECT_EQ(some.find("event 5"), std::string::npos);
     for (const char* bad : {"after=", "after=-1", "after=x", "after=1x", "before=1", "after",
-                            "after=99999999999999999999"}) {
+                            "after=99999999999999999999", "limit=0", "limit=10001"}) {
         const Reply reply = client.get(std::string("/api/v1/events?") + bad);
         EXPECT_EQ(reply.status, 400) << bad;
         EXPECT_NE(reply.body.find("expected"), std::string::npos) << reply.body;

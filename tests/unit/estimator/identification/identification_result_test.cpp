@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "tests/unit/estimator/identification/identified.hpp"
@@ -36,6 +37,31 @@ TEST(CrossCheck, ADisagreementNamesItsCoefficient) {
     // THEN the warning names the coefficient that differs most
     EXPECT_FALSE(result.cross_check.agrees());
     EXPECT_TRUE(reported(result, "puts " + result.cross_check.coefficient + " off by"));
+}
+
+TEST(RunAmplitudes, OfSeveralLevelsUnderOneRunNumberThereIsNoneAndThatIsSaid) {
+    const auto two_dwells = [](double first_g, double second_g) {
+        Identification identification{Settings{}};
+        RigSimulator rig(kCrossSeed);
+        SimulatedDwell plan;
+        plan.duration_s = 20;
+        for (const double level_g : {first_g, second_g}) {
+            plan.info = {1, plan.info.position + 1, -1};
+            plan.amplitude_g = level_g;
+            rig.dwell(identification, plan);
+        }
+        return identification.result();
+    };
+    for (const double second_g : {0.0, 14.0 / 3}) {
+        const Result mixed = two_dwells(6, second_g);
+        ASSERT_EQ(mixed.amplitudes.size(), 1U);
+        EXPECT_TRUE(std::isnan(mixed.amplitudes[0].amplitude_g)) << second_g;
+        EXPECT_FALSE(mixed.amplitudes[0].sigma_g > 0);
+        EXPECT_TRUE(reported(mixed, "run 1: found dwells from ")) << second_g;
+    }
+    const Result one = two_dwells(6, 6);
+    EXPECT_NEAR(one.amplitudes[0].amplitude_g, 6, 0.01);
+    EXPECT_FALSE(reported(one, "under one run number"));
 }
 
 TEST(CrossCheck, WithoutDataNothingIsCompared) {

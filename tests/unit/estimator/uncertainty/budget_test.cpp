@@ -173,6 +173,12 @@ TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
         return std::string();
     };
     EXPECT_EQ(refused({{"latitude", "azimuth", 0.3}}), "");
+    EXPECT_EQ(refused({{"latitude", "azimuth", 0.3}, {"latitude", "time_base", 0.3}}), "");
+    for (const auto& again :
+         {Correlation{"latitude", "azimuth", 0.3}, {"azimuth", "latitude", -0.3}})
+        EXPECT_EQ(refused({{"latitude", "azimuth", 0.3}, again}),
+                  "uncertainty.correlation: found '" + again.first + "' with '" + again.second +
+                      "' twice, expected each pair once");
     EXPECT_NE(refused({{"latitude", "longitude", 0.3}}).find("'longitude'"), std::string::npos);
     EXPECT_NE(refused({{"latitude", "azimuth", 1.5}}).find("1.5"), std::string::npos);
     EXPECT_NE(refused({{"latitude", "azimuth", 0.9},
@@ -233,6 +239,42 @@ TEST(Budget, ADeclaredRampWithinDwellsTakesThePlaceOfTheOneThatShows) {
     settings.uncertainty.ramp_in_dwell = Declared{0.12};
     const Coefficient bias = of_clean_rig(settings).coefficients[0];
     EXPECT_NEAR(bias.u_use, std::hypot(bias.u, 0.05, 0.12), 1e-12);
+}
+
+TEST(VerdictOfNothing, SaysWhatTookTheDwellsAndBlamesNoPositions) {
+    const Settings settings;
+    Result result;
+    result.observable.fill(false);
+    const auto sentence = [&] { return assess(settings, result).verdict.sentence; };
+    EXPECT_NE(sentence().find("these positions and levels"), std::string::npos)
+        << "no dwell at all";
+    // GIVEN forces in m/s^2
+    DwellSummary dwell;
+    dwell.left_out = dwell.flagged = true;
+    dwell.mean_force_g = 9.81;
+    dwell.reason = "mean vertical specific force is not 1 g within 2 %: dwell rejected";
+    result.dwells.assign(28, dwell);
+    EXPECT_EQ(sentence(),
+              "not valid, because no dwell is left to determine coefficients from: 28 of 28 are "
+              "rejected, mean vertical specific force is not 1 g within 2 %: dwell rejected (it is "
+              "9.81: are the forces in m/s^2?)");
+    // GIVEN another reason for some
+    for (auto& one : result.dwells) one.mean_force_g = 0.5;
+    result.dwells.front().reason = "no samples";
+    EXPECT_NE(sentence().find("28 of 28 are rejected, 27 of them: mean vertical"),
+              std::string::npos)
+        << sentence();
+    EXPECT_EQ(sentence().find("m/s^2"), std::string::npos);
+    // GIVEN dwells with nothing wrong that are all held out
+    for (auto& one : result.dwells) one.left_out = one.flagged = false;
+    EXPECT_EQ(sentence(),
+              "not valid, because no dwell is left to determine coefficients from: all are held "
+              "out or of another vibration");
+    // GIVEN some that are kept, and most rejected
+    result.rows = theory_rows(settings, estimator::testing::sequential(6, 14.0 / 3));
+    for (std::size_t i = 0; i < 20; ++i) result.dwells[i].left_out = true;
+    EXPECT_NE(sentence().find("; of the dwells, 20 of 28 are rejected"), std::string::npos)
+        << sentence();
 }
 
 TEST(VerdictOnTheWay, WhatLaterDwellsWillDetermineIsNoReasonYet) {

@@ -160,6 +160,7 @@ TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
     for (const Json& combination : result["combinations"]) {
         EXPECT_TRUE(combination["value"].is_number());
         EXPECT_GT(combination["sigma"].get<double>(), 0);
+        EXPECT_GT(combination["u"].get<double>(), combination["sigma"].get<double>());
         EXPECT_EQ(combination["weights"].size(), 2U);
     }
     const Json& first = result["combinations"][0];
