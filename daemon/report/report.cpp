@@ -110,6 +110,20 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
     }
 }
 
+void add_combinations(Page& page, const Analysis& a) {
+    const auto& combinations = a.replayed.result.combinations;
+    for (std::size_t i = 0; i < combinations.size(); ++i) {
+        std::string sum;
+        for (const auto& [name, weight] : combinations[i].weights)
+            sum += (sum.empty() ? "" : " + ") + fmt::format("{:.4g} {}", weight, name);
+        const bool known = i < a.assessed.combinations.size();
+        page.paragraph(fmt::format("Determined together: {} = {:.6f}, {} {:.6f}", sum,
+                                   known ? a.assessed.combinations[i].value : combinations[i].value,
+                                   known ? "u" : "sigma",
+                                   known ? a.assessed.combinations[i].u : combinations[i].sigma));
+    }
+}
+
 void add_coefficients(Page& page, const Analysis& a) {
     page.section("coefficients", "Coefficients");
     const bool assessed = a.assessed.done;
@@ -155,17 +169,7 @@ void add_coefficients(Page& page, const Analysis& a) {
         "Expected sigma: Cramer-Rao bound of the plan as it was run, without prior. "
         "Efficiency: that bound over sigma; near 1 the filter takes from the plan what "
         "there is.");
-    const auto& combinations = a.replayed.result.combinations;
-    for (std::size_t i = 0; i < combinations.size(); ++i) {
-        std::string sum;
-        for (const auto& [name, weight] : combinations[i].weights)
-            sum += (sum.empty() ? "" : " + ") + fmt::format("{:.4g} {}", weight, name);
-        const bool known = i < a.assessed.combinations.size();
-        page.paragraph(fmt::format("Determined together: {} = {:.6f}, {} {:.6f}", sum,
-                                   known ? a.assessed.combinations[i].value : combinations[i].value,
-                                   known ? "u" : "sigma",
-                                   known ? a.assessed.combinations[i].u : combinations[i].sigma));
-    }
+    add_combinations(page, a);
     for (const auto& warning : a.replayed.result.warnings) page.paragraph("Warning: " + warning);
     const Chart chart = correlation_chart([&](std::size_t i, std::size_t j) {
         const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
