@@ -261,7 +261,6 @@ def with_pymodbus(checks, programs, folder):
     played = None
     try:
         platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
-        platform.be_punctual()
         played = r.Child("shaker", [os.path.join(os.path.dirname(os.path.abspath(__file__)), "pymodbus_shaker.py"),
                                     str(rig.modbus_port), "--table", platform.control], folder)
         rig.start_daemon()
@@ -296,7 +295,6 @@ def life(timed, checks, programs, folder, may_repeat):
     rig = r.Rig(programs, BUS, "real", folder)
     try:
         rig.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
-        rig.be_punctual()
         rig.configure(SHORT, **r.PATIENT)
         rig.start_daemon()
         if not timed(campaign, checks, rig, folder, may_repeat):

@@ -44,7 +44,8 @@ TEST_F(Predict, ASineIsProvenByDwellsAtItsLevel) {
         run("predict result.json --profile other.json --verify held_out.csv "
             "--config held.toml --json");
     EXPECT_EQ(ended.exit_code, 0) << ended.error;
-    for (const auto& dwell : ended.json()["prediction"]["verification"]["dwells"])
+    const PredictJson prediction = ended.json()["prediction"];
+    for (const auto& dwell : prediction["verification"]["dwells"])
         EXPECT_NEAR(dwell["g_rms"].get<double>(), 3 / std::sqrt(2.0), 0.01);
 }
 
