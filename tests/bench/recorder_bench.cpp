@@ -3,47 +3,28 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <random>
 #include <string>
 
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/raw_log.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::bench {
 namespace {
 
-namespace fs = std::filesystem;
 constexpr int kRate_hz = 1000;
 constexpr int kFrames = 10;  ///< of one sample: four sensors' boxes, sync, platform, rig's time
 
-class Folder {
-  public:
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "vibrig-bench.XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Folder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    [[nodiscard]] std::string in(const char* name) const { return (path_ / name).string(); }
-    [[nodiscard]] std::string path() const { return path_.string(); }
-
-  private:
-    fs::path path_;
-};
-
 void write_sample(benchmark::State& state) {
-    const Folder folder;
+    const TemporaryFolder folder;
     record::Head head;
     head.name = head.campaign = "bench";
     configuration::RecordSettings settings;
     settings.keep_free_mb = 0;
     settings.segment_mb = 4;
-    record::CampaignWriter writer(folder.in("campaign.h5"), head);
-    record::RawLog log(folder.path(), "can0", settings, 1'700'000'000 * drivers::kSecond, {});
+    record::CampaignWriter writer(folder.file("campaign.h5"), head);
+    record::RawLog log(folder.string(), "can0", settings, 1'700'000'000 * drivers::kSecond, {});
     std::mt19937 random(1);
     std::normal_distribution<double> noise;
     drivers::Sample sample;

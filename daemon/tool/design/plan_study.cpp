@@ -412,9 +412,12 @@ class Study {
     void judge_uncertainty() {
         constexpr double kMostStep = 10;
         std::vector<planning::Visit> visits;
-        const planning::Effort before = done();
-        for (std::size_t i = 0; i < before.size(); ++i)
-            visits.insert(visits.end(), static_cast<std::size_t>(before[i]), candidates_.visits[i]);
+        // In the order in which they were done: a drift is told from coefficients by it.
+        if (!request_.done.empty()) {
+            for (const auto& run : plan_in(request_.done))
+                if (!(run.sweep_to_hz > 0) && !run.verify)
+                    visits.insert(visits.end(), run.count, {run.position_deg, run.level_g});
+        }
         for (const PlanRun& run : out_.runs)
             if (!run.verify) visits.insert(visits.end(), run.count, run.visit);
         if (visits.size() < 2 || terms_ != planning::kAllTerms) return;
