@@ -22,10 +22,10 @@ class ManualClock final : public Clock {
         return std::make_unique<ManualWaiter>(*this);
     }
     /// Waits until the waiter sleeps and has not been woken; the time it sleeps until. Throws after
-    /// ten seconds.
+    /// a minute.
     [[nodiscard]] Time rest() {
         std::unique_lock lock(mutex_);
-        if (!changed_.wait_for(lock, std::chrono::seconds(10),
+        if (!changed_.wait_for(lock, std::chrono::seconds(60),
                                [&] { return asleep_ && !notified_ && deadline_ > now_; })) {
             throw std::runtime_error("the thread does not come to rest");
         }

@@ -147,7 +147,7 @@ void TestServer::identify_as(std::string name) {
 
 bool TestServer::saw(const std::function<bool(const Request&)>& wanted) const {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::seconds(10),
+    return changed_.wait_for(lock, std::chrono::seconds(60),
                              [&] { return std::ranges::any_of(requests_, wanted); });
 }
 

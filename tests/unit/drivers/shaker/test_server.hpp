@@ -90,7 +90,7 @@ class TestServer {
     void set_input(int address, std::uint16_t value);
     /// What it answers to function 17 from now on (TCP); before, what libmodbus says.
     void identify_as(std::string name);
-    /// Waits until a request satisfies `wanted`; false after ten seconds.
+    /// Waits until a request satisfies `wanted`; false after a minute.
     [[nodiscard]] bool saw(const std::function<bool(const Request&)>& wanted) const;
 
   private:
