@@ -91,7 +91,9 @@ void check_bindings(const configuration::Loaded& loaded) {
     std::string why;
     collect([&] { why = campaign::check_stages(configuration.campaign, dbc, *port); });
     if (!missing.empty()) throw configuration::ConfigurationError(missing);
-    if (!why.empty()) throw configuration::ConfigurationError(why);
+    if (!why.empty())
+        throw configuration::ConfigurationError(place_of(loaded, why.substr(0, why.find(':'))) +
+                                                why);
     check_zeroing_travel(configuration);
 }
 

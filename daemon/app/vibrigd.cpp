@@ -162,7 +162,9 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
         spdlog::info("remote, with certificates: {}", remote);
     manager.ready(words_of(daemon.status()));
     const int signal = watch(daemon, manager, lock, signals, path);
-    manager.stopping();
+    // Then files are closed.
+    constexpr double kClosing_s = 30;
+    manager.stopping(daemon.longest_end_s() + kClosing_s);
     spdlog::info("{}: stopping", signal == 0 ? "a new version is installed" : ::strsignal(signal));
     daemon.shut_down();
     // In wall time: the rig's clock may stand still, a link may be gone. A second signal cuts it

@@ -5,6 +5,7 @@
 #include <systemd/sd-daemon.h>
 #include <time.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -48,7 +49,10 @@ void ServiceManager::reloading() const {
     notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(usec));
 }
 
-void ServiceManager::stopping() const { notify("STOPPING=1\nSTATUS=stopping"); }
+void ServiceManager::stopping(double longest_s) const {
+    notify("STOPPING=1\nSTATUS=stopping\nEXTEND_TIMEOUT_USEC=" +
+           std::to_string(std::llround(1e6 * longest_s)));
+}
 
 void ServiceManager::alive() const { notify("WATCHDOG=1"); }
 

@@ -11,7 +11,8 @@ class ServiceManager {
     void ready(const std::string& status) const;
     void status(const std::string& status) const;
     void reloading() const;
-    void stopping() const;
+    /// It waits as long at least before it kills, s.
+    void stopping(double longest_s) const;
     /// Feeds its watchdog.
     void alive() const;
     /// How often alive() is to be called, s; half of what the manager waits. 0: it does not wait.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "estimator/filter/angles.hpp"
+#include "estimator/levelling/refusal.hpp"
 
 namespace vibrig::campaign {
 
@@ -16,6 +17,25 @@ namespace level = estimator::levelling;
 namespace {
 
 constexpr double kSmallAngle = 5 * estimator::kRadPerDeg;
+
+/// What is stable and sampled well enough; names the key.
+void check(const LevellingSettings& s, const level::LevellerSettings& loop) {
+    const double steps_s = level::mean_decay(loop.fast) * s.settling_s * loop.period_s;
+    if (const double least_s = steps_s / level::kMostStep; s.settling_s < least_s)
+        throw level::DesignError(fmt::format(
+            "levelling.settling_s: found {:g}, expected at least {:g}, since the loop takes a step "
+            "each {:.3g} s",
+            s.settling_s, level::at_least(least_s, 3), loop.period_s));
+    if (!loop.slow) return;
+    try {
+        const level::Leveller trial(loop);
+    } catch (const level::DesignError& error) {
+        throw level::DesignError(fmt::format(
+            "levelling.slow_settling_s: found {:g}, expected nearer to levelling.settling_s = "
+            "{:g}: on the way from the ones to the others {}",
+            s.slow_settling_s, s.settling_s, error.what()));
+    }
+}
 
 level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Settings& rig,
                                 double sample_s, double torquer_limit_deg_h) {
@@ -37,6 +57,7 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
         rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(block));
     if (!s.velocity_north.empty()) loop.noise.reference_mps = s.velocity_noise_mps;
     loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * estimator::kDegPerRootHour;
+    check(s, loop);
     return loop;
 }
 
@@ -61,15 +82,24 @@ PositionLeveller::PositionLeveller(const LevellingSettings& settings,
 
 std::string PositionLeveller::refusal() const {
     const level::Leveller loop(loop_);
+    const double most_s = (level::kPatience - 1) * settings_.settling_s - 1 / loop.sigma();
+    if (settings_.window_s > most_s)
+        return fmt::format(
+            "levelling.window_s: found {:g}, expected at most {:g} with levelling.settling_s = "
+            "{:g}: a levelling is given {:g} settling times to settle, fill the window, and hold",
+            settings_.window_s, level::at_most(most_s, 3), settings_.settling_s, level::kPatience);
     if (loop.verdict() != level::Verdict::cannot_settle) return {};
     const auto window = loop.window_needed_s();
     return fmt::format(
-        "levelling.tolerance_arcmin: found {:g}, expected at least {:.3g} with levelling.window_s "
-        "= {:g} and noise.accelerometer_g = {:g} (four times the noise of the mean specific "
-        "force){}",
-        settings_.tolerance_arcmin, loop.tolerance_needed() / estimator::kRadPerArcmin,
-        settings_.window_s, rig_.accelerometer_g,
-        window ? fmt::format(", or levelling.window_s of at least {:.3g}", *window) : "");
+        "levelling.tolerance_arcmin: found {:g}, expected at least {:g} with levelling.window_s "
+        "= {:g}, noise.accelerometer_g = {:g} and noise.gyro_random_walk_deg_per_rt_h = {:g} (four "
+        "times the noise of the mean specific force, mostly {}){}",
+        settings_.tolerance_arcmin,
+        level::at_least(loop.tolerance_needed() / estimator::kRadPerArcmin, 3), settings_.window_s,
+        rig_.accelerometer_g, rig_.gyro_random_walk_deg_per_rt_h, loop.budget().dominant(),
+        window
+            ? fmt::format(", or levelling.window_s of at least {:g}", level::at_least(*window, 3))
+            : "");
 }
 
 void PositionLeveller::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
@@ -108,6 +138,11 @@ Vector PositionLeveller::to_axes(const level::Pair& rate) const {
     for (std::size_t i = 0; i < 3; ++i) {
         axes[i] = (rate[0] * channel_[1][i] - rate[1] * channel_[0][i]) / estimator::kDegPerHour;
     }
+    // Two channels at their limit add up to more on an axis that lies between them.
+    const double limit = loop_.torquer_limit / estimator::kDegPerHour;
+    double largest = limit;
+    for (const double axis : axes) largest = std::max(largest, std::abs(axis));
+    for (double& axis : axes) axis *= limit / largest;
     return axes;
 }
 

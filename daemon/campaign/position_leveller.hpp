@@ -20,7 +20,7 @@ namespace vibrig::campaign {
 /// position's nominal vertical. Control thread only.
 class PositionLeveller {
   public:
-    /// Throws estimator::levelling::DesignError.
+    /// Throws estimator::levelling::DesignError, with the key of [levelling].
     PositionLeveller(const LevellingSettings& settings, const estimator::Settings& rig,
                      double sample_s, double torquer_limit_deg_h);
 

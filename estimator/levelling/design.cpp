@@ -106,7 +106,7 @@ void check_period(double period_s, double sigma, double settling_s) {
     if (sigma * period_s > kMostStep) {
         throw DesignError(
             text("sample period %.3g s is too long for a %.3g s levelling: at most %.2g s",
-                 period_s, settling_s, kMostStep / sigma));
+                 period_s, settling_s, at_most(kMostStep / sigma, 2)));
     }
 }
 

@@ -300,8 +300,9 @@ std::string Leveller::message() const {
     const char* channel = trouble_channel_ % 2 == 0 ? "first" : "second";
     const auto remedy = [&]() -> std::string {
         const auto window = window_needed_s();
-        return window ? text("; a window of %.4g s would do", *window)
-                      : std::string("; no window would do");
+        return text(": expected at least %.3g'", at_least(tolerance_needed() / kRadPerArcmin, 3)) +
+               (window ? text("; a window of %.4g s would do", at_least(*window, 4))
+                       : std::string("; no window would do"));
     };
     const auto failure = [&]() -> std::string {
         switch (trouble_) {

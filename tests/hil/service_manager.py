@@ -139,7 +139,10 @@ def talks(checks, rig, manager):
     checks.check("RELOADING=1" in heard and "READY=1" in heard, "a reload is announced and ended", str(heard))
     checks.check(rig.daemon.says("takes effect with the next start"), "a reload checks the configuration", rig.logs())
     rig.daemon.process.send_signal(signal.SIGTERM)
-    checks.check("STOPPING=1" in manager.listen(10, "STOPPING=1"), "it says STOPPING")
+    heard = manager.listen(10, "EXTEND_TIMEOUT_USEC=")
+    checks.check("STOPPING=1" in heard, "it says STOPPING", str(heard))
+    asked_s = [float(line.partition("=")[2]) / 1e6 for line in heard if line.startswith("EXTEND_TIMEOUT_USEC=")]
+    checks.check(bool(asked_s) and asked_s[0] > CAMPAIGN["ramp_s"] + 30, "and how long that may take", str(heard))
     checks.equal(rig.daemon.end(timeout=30), 0, "and ends with status 0")
 
 

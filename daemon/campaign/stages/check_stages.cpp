@@ -31,7 +31,7 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
                     ? "0: levelling.velocity_north and velocity_east are not configured"
                     : "above 0: no reading of the base's velocity is exact");
     } catch (const estimator::levelling::DesignError& error) {
-        return std::string("levelling: ") + error.what();
+        return error.what();
     } catch (const estimator::zeros::ZeroError& error) {
         return std::string("zeroing: ") + error.what();
     }

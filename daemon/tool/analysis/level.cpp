@@ -73,10 +73,12 @@ void add_design_options(CLI::App& command, Options& o) {
     add_numbers(command, "--drift", o.drift, 2, "deg/h (0.1,-0.1)", -1e6, 1e6);
     add_number(command, "--settling", o.specification.settling_s, "settling time in s (100)",
                kAboveZero, 1e7);
-    add_number(command, "--residual", o.specification.residual,
-               "fraction of the initial tilt left then (0.005)");
-    add_number(command, "--damping", o.specification.damping, "ratio xi (0.7)");
-    add_numbers(command, "--gains", o.gains, 3, "K1,K2,K3 instead of a design");
+    auto* residual = add_number(command, "--residual", o.specification.residual,
+                                "fraction of the initial tilt left then (0.005)");
+    auto* damping = add_number(command, "--damping", o.specification.damping, "ratio xi (0.7)");
+    add_numbers(command, "--gains", o.gains, 3, "K1,K2,K3 instead of a design")
+        ->excludes(residual)
+        ->excludes(damping);
     add_number(command, "--period", o.period_s, "s between samples (0.1)", 1e-4, 1e4);
     add_number(command, "--window", o.window_s,
                "of the means in s (1); shaker on: whole vibration periods", kAboveZero, 3600);

@@ -6,6 +6,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/exit_status.hpp"
 #include "daemon/tool/analysis/level_options.hpp"
+#include "estimator/levelling/refusal.hpp"
 #include "proto/json_number.hpp"
 #include "proto/json_text.hpp"
 
@@ -98,7 +99,7 @@ int run_design(const Options& options) {
             << printed("\nRouth: K1 (1 + K2) = %.5g > K3 = %.5g\n", gains.k1 * (1 + gains.k2),
                        gains.k3)
             << printed("sample period %.4g s, at most %.4g s\n", loop.period_s,
-                       levelling::kMostStep / sigma)
+                       levelling::at_most(levelling::kMostStep / sigma, 4))
             << printed(
                    "tolerance %.3g'; from tilts up to %.4g' and %.4g' with drifts up to %.4g and "
                    "%.4g deg/h ",

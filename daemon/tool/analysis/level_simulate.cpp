@@ -32,6 +32,17 @@ levelling::Scenario scenario_of(const Options& options) {
     start.duration_s =
         options.duration_s > 0 ? options.duration_s : 3.1 * options.specification.settling_s;
     check_samples("--duration", start.duration_s, options.period_s);
+    if (start.duration_s < options.period_s) {
+        throw std::invalid_argument(
+            printed("--duration: found %g s, expected at least the %g s of --period",
+                    start.duration_s, options.period_s));
+    }
+    if (const bool slow = !options.slow.empty();
+        options.network != "fast" && (slow || options.torquer_limit != Options{}.torquer_limit)) {
+        throw std::invalid_argument(printed("%s: found with --network %s, expected --network fast",
+                                            slow ? "--slow" : "--torquer-limit",
+                                            options.network.c_str()));
+    }
     if (options.step != 0 && options.step_s < 0 && options.runs == 1) {
         throw std::invalid_argument(printed(
             "--step: found %g without --step-at, expected the time of the step", options.step));
@@ -196,6 +207,7 @@ std::string json_of(const Options& options, const OneStart& of) {
         result["verdict"] = levelling::name_of(of.run.verdict);
         result["settled_s"] = of.run.settled_s >= 0 ? Json(of.run.settled_s) : Json(nullptr);
         result["force_arcmin"] = both(of.run.observables.force_rad, kRadPerArcmin);
+        result["rate_arcmin"] = both(of.run.observables.rate_rad, kRadPerArcmin);
         result["drift_deg_h"] = both(of.run.drift, kDegPerHour);
         result["noise"] = budget_json(of.leveller);
         result["message"] = of.run.message;
@@ -219,7 +231,11 @@ std::string text_of(const OneStart& of) {
                           std::min(of.start.loop.settling_s, of.start.duration_s), tolerance);
     text += of.settled ? printed("settled after %.5g s", of.run.settled_s)
                        : std::string(levelling::name_of(of.run.verdict));
+    const auto& [force, rate] = of.run.observables;
     text += printed("; tolerance %.3g'\n", tolerance) +
+            printed("mean specific force %.4g' and %.4g'; left for z %.4g' and %.4g'\n",
+                    force[0] / kRadPerArcmin, force[1] / kRadPerArcmin, rate[0] / kRadPerArcmin,
+                    rate[1] / kRadPerArcmin) +
             printed("drift found: %.5g and %.5g deg/h\n", of.run.drift[0] / kDegPerHour,
                     of.run.drift[1] / kDegPerHour) +
             budget_table(of.leveller);
@@ -236,6 +252,11 @@ int run_simulate(const Options& options) {
             throw std::invalid_argument(
                 printed("--plot: found %s with --runs %zu, expected one start",
                         options.plot.c_str(), options.runs));
+        if (options.network != "fast")
+            throw std::invalid_argument(
+                printed("--runs: found %zu with --network %s, which has no verdict of its own; "
+                        "expected one start",
+                        options.runs, options.network.c_str()));
         if (options.step_s >= 0)
             throw std::invalid_argument(
                 printed("--step-at: found %g with --runs %zu, whose steps come at any time; "

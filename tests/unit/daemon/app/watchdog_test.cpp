@@ -51,8 +51,9 @@ TEST_F(ServiceManagerTest, IsReportedInItsOwnWords) {
     EXPECT_EQ(reported(), "WATCHDOG=1");
     service.reloading();
     EXPECT_EQ(reported().find("RELOADING=1\nMONOTONIC_USEC="), 0U);
-    service.stopping();
-    EXPECT_EQ(reported(), "STOPPING=1\nSTATUS=stopping");
+    // A ramp of 600 s down is longer than the service manager would wait by itself.
+    service.stopping(612.5);
+    EXPECT_EQ(reported(), "STOPPING=1\nSTATUS=stopping\nEXTEND_TIMEOUT_USEC=612500000");
 }
 
 TEST_F(ServiceManagerTest, IsNotifiedTwiceInTheTimeThatItWaits) {

@@ -227,6 +227,31 @@ TEST_F(StagesTest, WhatCannotWorkIsRefusedBeforehandWithKeyValueAndWhatIsExpecte
     settings.level.tolerance_arcmin = 0.001;
     EXPECT_THAT(check(), HasSubstr("levelling.tolerance_arcmin: found 0.001, expected at least"));
     settings.level = {};
+    // GIVEN gyros whose noise no window of the accelerometers' mean makes less
+    settings.rig.gyro_random_walk_deg_per_rt_h = 0.1;
+    EXPECT_THAT(check(), HasSubstr("noise.gyro_random_walk_deg_per_rt_h = 0.1"));
+    settings.rig = {};
+    // GIVEN a loop faster than its steps of 0.1 s allow: 5.24985 x 0.1 s / 0.05
+    settings.level.settling_s = 10;
+    EXPECT_THAT(check(), HasSubstr("levelling.settling_s: found 10, expected at least 10.5"));
+    settings.level.settling_s = 10.5;
+    settings.level.window_s = 5;
+    EXPECT_EQ(check(), "");
+    settings.level = {};
+    // GIVEN a window that leaves no time for the loop to settle before it: 3 x 100 s - 100 s -
+    // 1/sigma
+    settings.level.window_s = 190;
+    EXPECT_THAT(check(), HasSubstr("levelling.window_s: found 190, expected at most 180"));
+    settings.level.window_s = 180;
+    EXPECT_EQ(check(), "");
+    settings.level = {};
+    // GIVEN gains so far apart that some on the straight way between them are unstable
+    for (const double slow_s : {1000.0, 5.0}) {
+        settings.level.slow_settling_s = slow_s;
+        EXPECT_THAT(check(), HasSubstr("levelling.slow_settling_s: found")) << slow_s;
+        EXPECT_THAT(check(), HasSubstr("unstable")) << slow_s;
+    }
+    settings.level = {};
     // GIVEN a velocity's noise without the velocity
     settings.level.velocity_noise_mps = 0.01;
     EXPECT_THAT(check(), HasSubstr("levelling.velocity_noise_mps: found 0.01, expected 0"));

@@ -7,6 +7,7 @@
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/levelling/noise_budget.hpp"
+#include "estimator/levelling/refusal.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace {
@@ -15,6 +16,7 @@ using namespace vibrig::estimator::levelling;
 using vibrig::estimator::kDegPerHour;
 using vibrig::estimator::kPi;
 using vibrig::estimator::kRadPerArcmin;
+using vibrig::estimator::text;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -119,6 +121,12 @@ TEST(LevellingDesign, RefusesWhatCannotWorkWithTheNumbers) {
             check_period(1, design({60, 0.005, 0.7}).sigma, 60);
         },
         {"sample period 1 s is too long for a 60 s levelling: at most 0.57 s"});
+    // What is said to be allowed is: 0.6191 s are, 0.62 s are not.
+    expect_refusal(
+        [] {
+            check_period(0.62, design({65, 0.005, 0.7}).sigma, 65);
+        },
+        {"sample period 0.62 s is too long for a 65 s levelling: at most 0.61 s"});
     // Stable at both ends of the ramp, K1 (1 + K2) = 3.03 against K3 = 4.995 in its middle.
     LevellerSettings ramp;
     ramp.fast = {0.1, 0, 0.09};
@@ -126,6 +134,21 @@ TEST(LevellingDesign, RefusesWhatCannotWorkWithTheNumbers) {
     check_stable(ramp.fast);
     check_stable(*ramp.slow);
     expect_refusal([&] { Leveller{ramp}; }, {"K1 (1 + K2) > K3"});
+}
+
+TEST(LevellingDesign, ALimitThatIsSaidIsOnTheSideThatPasses) {
+    EXPECT_EQ(text("%g", at_most(0.61907, 2)), "0.61");
+    EXPECT_EQ(text("%g", at_least(0.433403, 3)), "0.434");
+    EXPECT_EQ(text("%g", at_least(3 * 0.1, 3)), "0.3");
+    EXPECT_EQ(text("%g", at_most(0.57, 2)), "0.57");
+    for (const double value : {1e-7, 0.28, 0.29, 0.57, 0.999, 1.0, 99.95, 123456.0}) {
+        for (const int digits : {2, 3, 4}) {
+            EXPECT_LE(at_most(value, digits), value * (1 + 2 * kRounding)) << digits;
+            EXPECT_GE(at_least(value, digits), value * (1 - 2 * kRounding)) << digits;
+            EXPECT_NEAR(at_most(value, digits), value, value * std::pow(10, 1 - digits));
+            EXPECT_NEAR(at_least(value, digits), value, value * std::pow(10, 1 - digits));
+        }
+    }
 }
 
 TEST(LevellingDesign, SteadyTiltFollowsDriftAndZero) {

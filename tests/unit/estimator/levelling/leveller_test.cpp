@@ -362,6 +362,13 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
     EXPECT_EQ(hopeless.step({}).verdict, Verdict::cannot_settle);
     expect_words(hopeless.message(),
                  {"cannot settle", "below 4 times the noise", "accelerometer", "no window"});
+    // AND the tolerance that it names does
+    const std::string said = hopeless.message();
+    const auto at = said.find("expected at least ");
+    ASSERT_NE(at, std::string::npos) << said;
+    s.tolerance_rad = std::stod(said.substr(at + 18)) * kRadPerArcmin;
+    EXPECT_NEAR(s.tolerance_rad, hopeless.tolerance_needed(), 0.01 * hopeless.tolerance_needed());
+    EXPECT_EQ(Leveller(s).verdict(), Verdict::settling) << said;
     // AND the default tolerance follows the noise: of the tilt and, over 100 samples, of the means
     s.tolerance_rad = 0;
     s.noise.accelerometer_mps2 = 2e-3 * kG;

@@ -73,16 +73,41 @@ TEST_F(LevelCommand, SimulatesAStart) {
               std::string::npos)
         << out;
     // Of none there is no median.
-    EXPECT_EQ(vibrig("level simulate --runs 3 --network undamped"), 1);
+    EXPECT_EQ(vibrig("level simulate --runs 3 --duration 20"), 1);
     EXPECT_NE(out.find("0 of 3 settled"), std::string::npos) << out;
     EXPECT_EQ(out.find("median"), std::string::npos) << out;
-    const Json none = json("level simulate --runs 3 --network undamped", 1);
+    const Json none = json("level simulate --runs 3 --duration 20", 1);
     for (const char* key : {"median_s", "p95_s", "longest_s", "worst_tilt_arcmin"})
         EXPECT_TRUE(none[key].is_null()) << key;
     // Six degrees are not for this loop; a loop given no time has not settled.
     EXPECT_EQ(vibrig("level simulate --tilt 400,0"), 1);
     EXPECT_NE(out.find("coarse levelling first"), std::string::npos);
     EXPECT_EQ(vibrig("level simulate --duration 20"), 1);
+}
+
+TEST_F(LevelCommand, AStartIsSummedUpByBothObservables) {
+    // GIVEN a start that settles: mean specific force and what z has still to take up are in band
+    const std::string start = "level simulate --tolerance 0.2 --seed 4";
+    const Json settled = json(start, 0);
+    for (const char* observable : {"force_arcmin", "rate_arcmin"})
+        for (const double channel : settled[observable]) EXPECT_LT(std::abs(channel), 0.2);
+    EXPECT_EQ(vibrig(start), 0);
+    EXPECT_NE(out.find("mean specific force "), std::string::npos) << out;
+    EXPECT_NE(out.find("left for z "), std::string::npos) << out;
+    // AND one given too little time, where they are not
+    const Json early = json(start + " --duration 50", 1);
+    EXPECT_GT(std::abs(early["rate_arcmin"][0].get<double>()), 0.2);
+}
+
+TEST_F(LevelCommand, TheLongestPeriodThatADesignNamesIsTaken) {
+    for (int settling = 20; settling < 120; settling += 7) {
+        const std::string given = "level design --settling " + std::to_string(settling);
+        ASSERT_LE(vibrig(given), 1) << error;
+        const auto at = out.find("s, at most ");
+        ASSERT_NE(at, std::string::npos) << out;
+        const std::string longest = out.substr(at + 11, out.find(' ', at + 11) - at - 11);
+        EXPECT_LE(vibrig(given + " --period " + longest), 1) << error;
+    }
 }
 
 TEST_F(LevelCommand, ADesignPromisesWhatSimulatedStartsKeep) {
@@ -132,6 +157,19 @@ TEST_F(LevelCommand, RefusesBadInput) {
                    "--step-at: found 1000 s, expected less than the 310 s of --duration");
     expect_refusal("level simulate --step 5 --step-at 40 --duration 40",
                    "--step-at: found 40 s, expected less than the 40 s of --duration");
+    // Of the other networks, which judge nothing, none ever settled.
+    for (const char* network : {"undamped", "conventional"})
+        expect_refusal(std::string("level simulate --runs 5 --network ") + network,
+                       std::string("--runs: found 5 with --network ") + network);
+    for (const char* option : {"--slow 0.1,3000,100", "--torquer-limit 5"})
+        expect_refusal(std::string("level simulate --network conventional ") + option,
+                       "--network conventional");
+    for (const char* option : {"--residual 0.1", "--damping 0.5"})
+        expect_refusal(std::string("level design --gains 0.1575,7242,192 ") + option, "--gains");
+    // A start without a sample is none.
+    for (const char* more : {"", " --json", " --network undamped"})
+        expect_refusal(std::string("level simulate --duration 0.04") + more,
+                       "--duration: found 0.04 s, expected at least the 0.1 s of --period");
     expect_refusal("level simulate --runs 5 --plot x.svg", "--plot: found x.svg with --runs 5");
     expect_refusal("level simulate --runs 5 --step 2 --step-at 9",
                    "--step-at: found 9 with --runs 5");
@@ -160,6 +198,15 @@ TEST_F(LevelCommand, RefusesBadInput) {
 TEST_F(LevelCommand, ReproducesTheTable) {
     const Json result = json("reproduce zha2019 --seeds 2", 0)["reproductions"][0];
     EXPECT_TRUE(result["agrees"].get<bool>());
+    // By the differential equations: 0.440 and 2.740 % at 600 s, 0.5 % at 596.57 and 1236.64 s.
+    const auto computed = [&](const std::string& item) {
+        for (const Json& row : result["rows"])
+            if (row["item"] == item) return row["computed"].get<std::string>();
+        return std::string("no row");
+    };
+    EXPECT_EQ(computed("residual at 600 s, designed / printed gains"), "0.44 % / 2.7 %");
+    EXPECT_EQ(computed("time to 0.5 %, designed gains"), "597 s");
+    EXPECT_EQ(computed("time to 0.5 %, printed gains"), "1237 s");
     bool erratum = false;
     for (const Json& row : result["rows"]) {
         erratum = erratum || (row["item"] == "K2" && row["published"] == "156.063" &&
