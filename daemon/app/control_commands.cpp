@@ -259,15 +259,30 @@ void ControlLoop::watch_emergency_stop(Time now) {
     if (!open || at_start || latches_.find(name) != nullptr) return;
     // What was aborted a moment ago is still to come to rest.
     if (!tripped && !configuration_.campaign.second_person && !campaign_.stopping()) return;
-    std::string armed_by = campaign_.armed_by();
-    for (const Latch& latch : latches_.open())
-        if (armed_by.empty()) armed_by = latch.armed_by;
     const std::string text = rt::text_of(rt::Trip::emergency_stop);
     log(Severity::warning, "interlock", text + (tripped ? " after the trip" : ""));
     events_.announce(drivers::HornPattern::abort, text);
-    latch({name, text, armed_by, {}, configuration_.campaign.second_person});
+    latch({name, text, armed_by_last(), {}, configuration_.campaign.second_person});
     if (tripped) return campaign_.take_over_trip(latches_.causes());
     campaign_.on_trip(latches_.causes(), now);
+}
+
+/// The stop of another trip: the interlock has its first cause, and a restart is to know this one.
+void ControlLoop::watch_disobeyed() {
+    const auto& disobeyed = rt::condition_of(rt::Trip::stop_disobeyed);
+    const rt::Tripped first = interlock_.latched();
+    if (!parts_.rig.is_disobeyed() || !first || first.cause == disobeyed.trip ||
+        !(first == handled_) || latches_.find(disobeyed.name) != nullptr)
+        return;
+    latch({disobeyed.name, disobeyed.text, armed_by_last(), {}, false});
+}
+
+/// Who armed what is under way, or what the open latches are of.
+std::string ControlLoop::armed_by_last() const {
+    std::string armed_by = campaign_.armed_by();
+    for (const Latch& latch : latches_.open())
+        if (armed_by.empty()) armed_by = latch.armed_by;
+    return armed_by;
 }
 
 void ControlLoop::on_trip(const rt::Tripped& tripped, Time now) {
@@ -329,7 +344,10 @@ CommandReply ControlLoop::acknowledge(const CommandRequest& request, Time now) {
         }
         if (of_journal || latches_.tripped()) {
             log(Severity::info, "interlock", fmt::format("{} by {}", answer.words, request.by));
-            if (latches_.tripped()) still = "; still latched: " + latches_.causes();
+            if (latches_.tripped()) {
+                still = "; still latched: " + latches_.causes();
+                campaign_.take_over_trip(latches_.causes());  // what is over is no reason any more
+            }
             return {true, answer.words + still};
         }
     }

@@ -19,14 +19,28 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
             attendance_->steady = rt::steady_now();
         return reply_later(waiting, {true, "there"});
     }
-    if (word == "read") {  // several times a second: no row of the audit
-        commissioning_.attend(request.by);
-        return reply_later(waiting, {true, read_commissioning(what)});
+    CommandReply reply;
+    try {
+        reply = commissioned(request, word, what, now);
+    } catch (const std::exception& error) {  // of files that others write, or take away
+        reply = {false, std::string("commission: ") + error.what()};
     }
-    if (word == "accept" || word == "state")
-        return answer(waiting, enter_in_record(request, what, now));
-    if (word == "sign") return answer(waiting, sign_record(request, what));
-    answer(waiting, commissioning_.command(request, word, what, now));
+    if (word == "read" && reply.accepted)  // several times a second: no row of the audit
+        reply_later(waiting, std::move(reply));
+    else
+        answer(waiting, reply);
+}
+
+/// Throws std::exception: a file cannot be read.
+CommandReply ControlLoop::commissioned(const CommandRequest& request, const std::string& word,
+                                       const Json& what, Time now) {
+    if (word == "read") {
+        commissioning_.attend(request.by);
+        return {true, read_commissioning(what)};
+    }
+    if (word == "accept" || word == "state") return enter_in_record(request, what, now);
+    if (word == "sign") return sign_record(request, what);
+    return commissioning_.command(request, word, what, now);
 }
 
 std::string ControlLoop::read_commissioning(const Json& what) {

@@ -18,10 +18,9 @@ void ControlLoop::run() {
         const Time now = parts_.clock.now();
         supervisor_.beat(now);
         const auto words = [this](const RtEvent& event) {
-            if (event.dropped_before > 0) {
+            if (event.dropped_before > 0)
                 log(Severity::warning, event.source.data(),
                     fmt::format("{} events lost before the next", event.dropped_before));
-            }
             log(event.severity, event.source.data(), event.text.data());
         };
         parts_.port_events.consume(words);
@@ -33,6 +32,7 @@ void ControlLoop::run() {
         if (first_reading_known_.load() && !std::exchange(first_reading_judged_, true))
             judge_first_reading(now);
         watch_emergency_stop(now);
+        watch_disobeyed();
         supervisor_.look(outside_.guard_lacks());
         watch_outside();
         interlock_.filter(

@@ -100,6 +100,8 @@ class ControlLoop {
     void take_over_latches();
     void judge_first_reading(drivers::Time now);
     void watch_emergency_stop(drivers::Time now);
+    void watch_disobeyed();
+    [[nodiscard]] std::string armed_by_last() const;
     void on_trip(const rt::Tripped& tripped, drivers::Time now);
     void latch(Latch latch);
     CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
@@ -118,6 +120,8 @@ class ControlLoop {
 
     // What commissioning asks and tells (control_commission.cpp).
     void commission(WaitingCommand waiting, drivers::Time now);
+    CommandReply commissioned(const CommandRequest& request, const std::string& word,
+                              const commission::Json& what, drivers::Time now);
     /// Of record and procedure.
     [[nodiscard]] std::string read_commissioning(const commission::Json& what);
 

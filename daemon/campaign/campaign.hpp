@@ -232,6 +232,7 @@ class Campaign {
     CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string resume_offer() const;
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
+    [[nodiscard]] std::string not_at_rest(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_resume(drivers::Time now) const;
     /// Paused for so long that the arming has ended: it may be armed where it is.

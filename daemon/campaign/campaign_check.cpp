@@ -49,6 +49,7 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
 
 std::string Campaign::not_fit_to_check(Time now) const {
     if (auto why = not_fit_to_move(now); !why.empty()) return why;
+    if (auto why = not_fit_to_excite(now); !why.empty()) return why;
     if (ports_.rig.feed == nullptr) return "no samples to look at";
     return LoopCheck::beyond_limits(settings_);
 }

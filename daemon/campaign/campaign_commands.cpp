@@ -93,6 +93,11 @@ std::string Campaign::not_fit_to_excite(Time now) const {
     if (writes_held_)
         return "nothing but a stop is written to the controller: its registers had not been tried "
                "when vibrigd started; start it again once they were";
+    return not_at_rest(now);
+}
+
+/// What a controller that is only read has in its timeout says nothing of the daemon's writing.
+std::string Campaign::not_at_rest(Time now) const {
     const auto reading = ports_.rig.shaker.reading();
     if (ports_.rig.shaker.stop_pending()) return "a stop of the shaker is pending";
     if (stop_.stopping()) {
@@ -103,10 +108,10 @@ std::string Campaign::not_fit_to_excite(Time now) const {
     if (reading.emergency_stop_open) return "the emergency-stop chain is open";
     if (reading.fault != 0 || reading.state == drivers::kShakerFault)
         return fmt::format("shaker fault {:#06x}", reading.fault);
-    if (reading.watchdog == drivers::WatchdogTimeout::changed)
+    if (!writes_held_ && reading.watchdog == drivers::WatchdogTimeout::changed)
         return fmt::format("the controller's watchdog timeout reads {:g} s, not what was written",
                            reading.watchdog_timeout_s);
-    if (reading.watchdog == drivers::WatchdogTimeout::unread)
+    if (!writes_held_ && reading.watchdog == drivers::WatchdogTimeout::unread)
         return "the controller's watchdog timeout has not been read back yet";
     if (!reading.at_rest()) return "the shaker is not at rest";
     if (stop_.rest(now).moving()) return "not at rest: " + stop_.what_moves(now);

@@ -30,7 +30,8 @@ std::string Campaign::not_fit_to_move(Time now) const {
     if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (state_ == State::armed) return "armed for a campaign: abort that first";
-    if (auto why = not_fit_to_excite(now); !why.empty()) return why;
+    if (auto why = ports_.rig.unfit(); !why.empty()) return why;
+    if (auto why = not_at_rest(now); !why.empty()) return why;
     if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
     if (torquing(ports_.rig)) return "the platform is torqued, expected free drift";
     return {};

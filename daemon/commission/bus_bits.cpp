@@ -86,8 +86,9 @@ BitBook::BitBook(const configuration::Configuration& c)
 BitBook::Json BitBook::bits() const {
     std::ifstream file(path_);
     const Json all = file ? Json::parse(file, nullptr, false) : Json();
-    if (!all.is_object() || all.value("dbc_sha256", "") != dbc_sha256_) return Json::object();
-    return all.value("bits", Json::object());
+    if (!all.is_object() || !all.contains("dbc_sha256") || all["dbc_sha256"] != dbc_sha256_)
+        return Json::object();
+    return all.contains("bits") && all["bits"].is_object() ? all["bits"] : Json::object();
 }
 
 void BitBook::keep(const std::vector<BitProof>& bits, std::int64_t utc_ns) {

@@ -137,8 +137,11 @@ void fill_keys(Finding& f, const room::Description& d, const room::EarthRate& ra
             const bool free = commanded.free[channel];
             // Readings in degrees: the file of a bus that counts otherwise is corrected.
             const double degrees = unit_of(d, g).degrees;
-            const double low = free ? -360 : degrees * commanded.travel[channel][0];
-            const double high = free ? 360 : degrees * commanded.travel[channel][1];
+            const auto [from, to] = commanded.travel[channel];
+            // Of the ranges that are whole turns apart the one about zero: a key takes a turn.
+            const double turns = free ? 0 : std::round(degrees * (from + to) / 2 / 360);
+            const double low = free ? -360 : degrees * from - 360 * turns;
+            const double high = free ? 360 : degrees * to - 360 * turns;
             limited = limited || high - low < 360;
             travel += fmt::format("{}[{:.1f}, {:.1f}]", g == 0 ? "" : ", ", low, high);
         }

@@ -25,6 +25,14 @@ bool of_this_daemon_alone(const std::string& id) { return id == "go_on" || id ==
 
 constexpr double kGood_h = 24;
 
+/// Whose members are what write() makes of them; a replay finds out about the log's entries.
+bool as_written(const Json& all) {
+    return all.is_object() && all.contains("log") && all["log"].is_array() &&
+           all.contains("version") && all["version"] == 1 && all.contains("by") &&
+           all["by"].is_string() && all.contains("by_hand") && all["by_hand"].is_boolean() &&
+           all.contains("utc_ns") && all["utc_ns"].is_number_integer();
+}
+
 }  // namespace
 
 Progress::Progress(const std::string& folder, Json rig)
@@ -55,17 +63,17 @@ Kept Progress::read(const std::string& by, bool by_hand, std::int64_t utc_ns) co
     const Json all = file ? Json::parse(file, nullptr, false) : Json();
     if (!file) {
         kept.why_not = path_ + ": nothing is kept";
-    } else if (!all.is_object() || all.value("version", 0) != 1 || !all.contains("log")) {
+    } else if (!as_written(all)) {
         kept.why_not = path_ + ": not what vibrigd wrote";
     } else if (const double hours =
-                   1e-9 * double(utc_ns - all.value("utc_ns", std::int64_t{})) / 3600;
+                   1e-9 * double(utc_ns - all["utc_ns"].get<std::int64_t>()) / 3600;
                hours < 0 || hours > kGood_h) {
         kept.why_not = fmt::format("{}: {:.0f} h old, {:.0f} at most", path_, hours, kGood_h);
     } else if (all.value("rig", Json()) != rig_) {
         kept.why_not = path_ + ": of another can, DBC or gimbal.message";
-    } else if (!journal::same_person(all.value("by", ""), by)) {
-        kept.why_not = fmt::format("{}: begun by {}", path_, all.value("by", ""));
-    } else if (all.value("by_hand", false) != by_hand) {
+    } else if (!journal::same_person(all["by"].get<std::string>(), by)) {
+        kept.why_not = fmt::format("{}: begun by {}", path_, all["by"].get<std::string>());
+    } else if (all["by_hand"] != by_hand) {
         kept.why_not = path_ + (by_hand ? ": moved by command" : ": moved by hand");
     } else {
         kept.log = all["log"];

@@ -251,6 +251,9 @@ def whole(checks, programs, folder, seed):
             checks.check(said.returncode == code and word in said.stdout + said.stderr, f"drift_sign is stated by two apart: {word}", said.stdout + said.stderr)
         signed = tool("commission", "status").stdout.replace("\n   ", " ")
         checks.check(re.search("^gyros .*Bo, 0 days old, until [-0-9]+, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
+        at_rest = tool("selftest", "--by", "Ada", "--rest", timeout=120)
+        checks.check(at_rest.returncode == 0 and "the rig is what its configuration says" in at_rest.stdout,
+                     "at rest it is checked before its shaker's registers are tried", at_rest.stdout + at_rest.stderr)
         shaker_is_proven(checks, u)
         another_controller(checks, u)
         another_one_while_armed(checks, u)
@@ -649,8 +652,11 @@ def signatures_are_missed(checks, u):
 
 def unsigned(checks, u):
     """Recorded anew by two persons without a certificate: what follows forges that."""
-    stated = u.rig.tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes")
-    checks.equal(stated.returncode, 0, "gyros are stated anew, and signed by nobody: " + stated.stderr)
+    stated = u.rig.tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes", "--json")
+    checks.check(stated.returncode == 0, "gyros are stated anew, and signed by nobody", stated.stderr)
+    outcome = json.loads(stated.stdout or "{}")
+    checks.check(outcome.get("outcome") == "decided" and outcome["simulated"] and outcome["parts"]["gyros"]["by"][1] == "Bo" and
+                 "platform.drift_sign = -1" in stated.stderr, "as JSON the outcome alone", stated.stdout + stated.stderr)
 
 
 def each_key_is_caught_twice(checks, u, text):
@@ -787,7 +793,7 @@ def nothing_is_written(checks, programs, folder):
 
 
 def few_bits(checks, programs, folder):
-    """Angles of fewer than 12 bits by the DBC are reported at the first look; 12 are enough."""
+    """Angles of fewer than 12 bits by the DBC are reported at the first look; 12 are enough. A DBC that is gone is an answer."""
     u = Unknown(checks, programs, folder, drawn(4))
     dbc = os.path.join(folder, "narrow.dbc")
     with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc"), encoding="utf-8") as file:
@@ -802,6 +808,11 @@ def few_bits(checks, programs, folder):
             line = f"ResolverAzimuth.Azimuth has {bits} bits, 12 at least expected"
             checks.equal(line in unwrapped(run.stdout), reported, f"an angle of {bits} bits is {'reported' if reported else 'fine'}")
             checks.check("A  40.0 samples/s, 6 channels, |f| = " in unwrapped(run.stdout), "with the rate of the samples", run.stdout + run.stderr)
+        os.remove(dbc)
+        body = json.dumps({"kind": "commission", "by": "Ada", "argument": '{"do": "read", "bits": true}'})
+        answer = raw_command(u.rig, body)
+        checks.check("narrow.dbc: cannot be read" in answer and u.rig.status() is not None, "a DBC that is taken away is named, and the daemon goes on",
+                     answer + u.rig.logs())
     finally:
         u.rig.stop()
 

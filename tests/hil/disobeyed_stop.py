@@ -145,6 +145,36 @@ def stuck_contactor(checks, programs, folder):
         rig.stop()
 
 
+def after_another_trip(checks, programs, folder):
+    """The first cause is the interlock's; that its stop was not obeyed is a latch beside it, of which a restart knows."""
+    rig = Liar(programs, folder)
+    try:
+        rig.shake(checks)
+        rig.order("fault stuck-contactor")
+        rig.order("fault loop-open")
+
+        def latched(status):
+            return [latch["name"] for latch in status["interlock"]["latches"]]
+        status = rig.wait_for(lambda s: "stop_disobeyed" in latched(s), DEADLINE_S + BUSY_S)
+        checks.equal((status["interlock"]["tripped"], latched(status)), ("loop_open", ["loop_open", "stop_disobeyed"]),
+                     "after another trip, too, a stop that is not obeyed latches")
+        checks.equal({latch["armed_by"] for latch in status["interlock"]["latches"]}, {"Ada (uid 0)"}, "of whoever armed it")
+        rig.order("estop open")
+        rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" and "emergency_stop" in latched(s), BUSY_S)
+        rig.daemon.end(signal.SIGKILL)
+        rig.start_daemon()
+        status = rig.wait_for(lambda s: latched(s), BUSY_S)
+        checks.check("stop_disobeyed" in latched(status) and "not obeyed" in status["campaign"]["reason"],
+                     "and after SIGKILL at rest the next start knows it", f"{latched(status)} {r.state_of(status)}")
+        rig.order("clear")
+        rig.order("estop close")
+        rig.wait_for(lambda s: not s["shaker"].get("emergency_stop_open"), BUSY_S)
+        said = rig.acknowledge(by="Ada")
+        checks.check(said.returncode == 0 and "not obeyed" in said.stdout and not latched(rig.status()), "until it is acknowledged", said.stdout + said.stderr)
+    finally:
+        rig.stop()
+
+
 def pressed_in_time(checks, programs, folder):
     """After an abort, while the table still moves: no row of the interlock watches the chain then."""
     rig = Liar(programs, folder)
@@ -235,7 +265,7 @@ def obeyed(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (acknowledged_without_stop, stuck_contactor, pressed_in_time, blind, obeyed):
+    for part in (acknowledged_without_stop, stuck_contactor, after_another_trip, pressed_in_time, blind, obeyed):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

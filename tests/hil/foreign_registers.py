@@ -180,6 +180,13 @@ def found_by_reading(checks, programs, line):
         amplitude = f'amplitude = {{ address = {AMPLITUDE}, type = "u32", word_order = "big", table = "holding", scale = 1e-06 }}'
         checks.equal(places.get("amplitude"), [amplitude], f"{name}: the amplitude's, beyond 65535 counts")
         checks.check((code, found.get("outcome")) == ((1, "undecided") if same else (0, "decided")), f"{name}: one place is decided, two are not", text)
+    person = Person(os.path.join(programs, "vibrig"), controller.where, line)
+    for shown in ("77.77", "88.88", "99.99", ""):   # which it keeps nowhere
+        person.until_asked()
+        person.type(shown)
+    code, found, text = person.end()
+    checks.check((code, found.get("outcome"), found.get("places")) == (1, "undecided", {"frequency": []}) and
+                 "no place shows what was typed: more registers" in text, f"{name}: what is nowhere is not for more counts to tell", text)
     checks.equal(controller.written(), 0, f"{name}: nothing was written")
 
 

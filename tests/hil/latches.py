@@ -257,8 +257,10 @@ def pressed_later(checks, rig):
         rig.tool("ack", "trip", "--by", "Ada")
         checks.equal(rig.latches(), ["emergency_stop"], f"{what}: which one person does not end, nor a restart")
         checks.equal(rig.tool("arm", "--by", "Ada").returncode, 1, f"{what}: nor is it armed")
-        rig.tool("ack", "trip", "--by", "Grace")
-        checks.equal(rig.latches(), [], f"{what}: another one does")
+        status = rig.status()
+        checks.equal(status["campaign"]["reason"], status["interlock"]["latches"][0]["cause"], f"{what}: and what is over is no reason any more")
+        last = rig.tool("ack", "trip", "--by", "Grace")
+        checks.equal((rig.latches(), "loop" in last.stdout), ([], False), f"{what}: another one does, and acknowledges nothing else")
     checks.check(rig.tool("arm", "--by", "Ada").returncode == 0, "then it can be armed")
     rig.tool("abort", "--by", "Ada")
 

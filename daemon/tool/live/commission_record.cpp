@@ -118,9 +118,9 @@ void sign_recorded(serve::Client& client, const CommissionOptions& options,
 }
 
 /// A line of a person, with blanks around it taken off.
-std::string line_of_person() {
+std::string line_of_person(std::ostream& out) {
     std::string line;
-    std::cout << "> " << std::flush;
+    out << "> " << std::flush;
     if (!std::getline(std::cin, line)) throw CommissionRefused("nobody answers: not stated");
     const auto first = line.find_first_not_of(" \t"), last = line.find_last_not_of(" \t");
     return first == std::string::npos ? "" : line.substr(first, last - first + 1);
@@ -128,34 +128,33 @@ std::string line_of_person() {
 
 /// What was said before is out of sight; where a terminal knows no way to clear itself it is
 /// scrolled away.
-void clear_terminal() {
-    if (isatty(STDOUT_FILENO) == 0) return;
+void clear_terminal(std::ostream& out) {
+    if (isatty(&out == &std::cerr ? STDERR_FILENO : STDOUT_FILENO) == 0) return;
     const char* const kind = std::getenv("TERM");
     const bool dumb = kind == nullptr || *kind == '\0' || std::string_view(kind) == "dumb";
     constexpr std::size_t kRows = 100;
-    std::cout << (dumb ? std::string(kRows, '\n') : "\x1b[H\x1b[2J\x1b[3J") << std::flush;
+    out << (dumb ? std::string(kRows, '\n') : "\x1b[H\x1b[2J\x1b[3J") << std::flush;
 }
 
 /// Of one person alone.
-CommissionJson sign_said_by(const std::string& person) {
-    clear_terminal();
-    print_wrapped(std::cout,
-                  "drift_sign cannot be measured. " + person +
-                      ", please, alone at the keyboard: a positive drift coefficient is");
-    std::cout << "  1  the gyro's output at zero input (IEEE Std 517)\n"
-                 "  2  the rate at which the platform turns\n"
-                 "  3  the torque that stops it\n";
+CommissionJson sign_said_by(std::ostream& out, const std::string& person) {
+    clear_terminal(out);
+    print_wrapped(out, "drift_sign cannot be measured. " + person +
+                           ", please, alone at the keyboard: a positive drift coefficient is");
+    out << "  1  the gyro's output at zero input (IEEE Std 517)\n"
+           "  2  the rate at which the platform turns\n"
+           "  3  the torque that stops it\n";
     std::string says;
     while (says != "1" && says != "2" && says != "3") {
-        std::cout << "? Which? [1, 2 or 3]\n";
-        says = line_of_person();
+        out << "? Which? [1, 2 or 3]\n";
+        says = line_of_person(out);
     }
     std::string source;
     while (source.empty()) {
-        std::cout << "? Where is that written? [name of the drawing or certificate]\n";
-        source = line_of_person();
+        out << "? Where is that written? [name of the drawing or certificate]\n";
+        source = line_of_person(out);
     }
-    clear_terminal();
+    clear_terminal(out);
     return {{"by", person}, {"says", says[0] - '0'}, {"source", source}};
 }
 
@@ -274,21 +273,30 @@ int state_gyros(const CommissionOptions& options) {
     if (options.yes && state["simulated"] != true)
         throw std::runtime_error("--yes: persons answer on a real rig");
     const auto now = configuration::load(state["configuration"].get<std::string>(), true);
+    std::ostream& out = aside(options);
     auto said = CommissionJson::array();
-    if (!options.yes) said = {sign_said_by(options.by), sign_said_by(options.second)};
-    std::cout << "From the drawing; nothing measures signs, output and spin axes or drift_sign:\n";
+    if (!options.yes) said = {sign_said_by(out, options.by), sign_said_by(out, options.second)};
+    out << "From the drawing; nothing measures signs, output and spin axes or drift_sign:\n";
     for (const auto& value : now.effective)
         if (value.key.starts_with("platform.gyro_") || value.key == "platform.drift_sign" ||
             value.key.starts_with("levelling.torque_"))
-            std::cout << "  " << value.key << " = " << value.value << '\n';
+            out << "  " << value.key << " = " << value.value << '\n';
     if (!agreed(options, options.by + " and " + options.second + ": is that so?"))
         throw CommissionRefused("not stated");
-    print_wrapped(std::cout, commission_command(client, options.by,
-                                                {{"do", "state"},
-                                                 {"part", "gyros"},
-                                                 {"second", options.second},
-                                                 {"statements", said}}));
+    const auto answer = commission_command(
+        client, options.by,
+        {{"do", "state"}, {"part", "gyros"}, {"second", options.second}, {"statements", said}});
+    print_wrapped(out, answer);
     sign_recorded(client, options, {"gyros"});
+    if (options.json)
+        std::cout << proto::json_text(
+                         CommissionJson{
+                             {"outcome", "decided"},
+                             {"message", answer},
+                             {"simulated", state["simulated"]},
+                             {"parts", commission_state(client, options.by, 0)["record"]["parts"]}},
+                         1)
+                  << '\n';
     return 0;
 }
 

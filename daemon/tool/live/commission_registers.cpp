@@ -156,12 +156,13 @@ int find_registers(const RegisterOptions& options) {
     out << "Read-only: " << link.name() << ", " << options.holding << " holding and "
         << options.input << " input registers. The shaker's power stage is off.\n";
     RegisterJson all = RegisterJson::object();
-    bool one_each = true;
+    bool one_each = true, none = false;
     for (const auto& [quantity, examples] : {std::pair{"frequency", "e.g. 15.00, 17.50, 21.25 Hz"},
                                              std::pair{"amplitude", "e.g. 0.10, 0.25, 0.40"}}) {
         const auto places = places_by_values(link, options, out, quantity, examples);
         if (!places) continue;
         one_each = one_each && places->size() == 1;
+        none = none || places->empty();
         all[quantity] = RegisterJson::array();
         for (const auto& place : *places) {
             all[quantity].push_back(commission::toml_line(quantity, place));
@@ -182,6 +183,8 @@ int find_registers(const RegisterOptions& options) {
         return 0;
     }
     out << (all.empty() ? "UNFINISHED: nothing was set\n"
+            : none      ? "UNDECIDED: no place shows what was typed: more registers (--holding, "
+                          "--input), a display in another unit, or the manual\n"
                         : "UNDECIDED: what would tell: a value that needs more than 65535 counts, "
                           "or the manual\n");
     return kNo;

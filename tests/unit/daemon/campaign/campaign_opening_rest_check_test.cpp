@@ -122,6 +122,20 @@ TEST_F(RestCheckTest, IsRefusedWhereverGimbalsMayNotMove) {
     EXPECT_TRUE(released());
 }
 
+TEST_F(RestCheckTest, AsksNothingOfAControllerThatIsOnlyRead) {
+    ready_with([](estimator::Settings&) {});
+    campaign->hold_writes();  // its registers are not tried yet
+    using Timeout = drivers::WatchdogTimeout;
+    for (const auto timeout : {Timeout::unread, Timeout::changed}) {
+        shaker.now.watchdog = timeout;
+        EXPECT_TRUE(order().accepted);
+        EXPECT_TRUE(command(Kind::abort).accepted);
+        run_for(5);
+        for (const auto kind : {Kind::arm, Kind::selftest})
+            EXPECT_THAT(command(kind).message, HasSubstr("its registers had not been tried"));
+    }
+}
+
 TEST_F(RestCheckTest, WithoutPositionsThereIsNone) {
     settings.opening.clear();
     make();

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <filesystem>
+#include <fstream>
 
 namespace vibrig::commission {
 namespace {
@@ -83,6 +84,18 @@ TEST_F(Bits, OfAConfigurationAreUnprovenUntilSomebodyHasThem) {
     EXPECT_THAT(unproven_bits(loaded, dbc), IsEmpty());
     loaded.configuration.dbc = "/nowhere/rig.dbc";
     EXPECT_THROW(static_cast<void>(unproven_bits(loaded, dbc)), std::runtime_error);
+}
+
+TEST_F(Bits, AFileThatSomebodyHasWrittenOtherwiseProvesNothing) {
+    std::filesystem::create_directories(folder);
+    for (const char* text : {"", "{", "[]", "null", R"({"dbc_sha256":5})",
+                             R"({"dbc_sha256":"abc"})", R"({"dbc_sha256":"abc","bits":5})",
+                             R"({"dbc_sha256":"abc","bits":["Resolvers.OuterValid"]})"}) {
+        std::ofstream(folder / "bus_bits.json") << text;
+        BitBook::Json bits;
+        ASSERT_NO_THROW(bits = BitBook(folder.string(), "abc").bits()) << text;
+        EXPECT_TRUE(bits.is_object() && bits.empty()) << text;
+    }
 }
 
 TEST_F(Bits, AConfirmationDoesNotReplaceAProof) {

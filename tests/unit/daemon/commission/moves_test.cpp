@@ -260,5 +260,37 @@ TEST_F(Commissioned, ASoftStopIsReportedWithItsGimbalAndATravelWithinItIsScaledI
     EXPECT_GE(decided, 10);
 }
 
+/// Encoders count from 0 to 360, or from wherever: with a reading of 353 deg at the start 383 would
+/// be no value of the key.
+TEST_F(Commissioned, TheTravelThatIsFoundIsOneThatTheConfigurationTakes) {
+    int beyond_a_turn = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        const auto start = rig->reading_at(rig->angle_deg());
+        const Json result = run()["result"];
+        if (result["outcome"] != "decided") continue;
+        const Json& found = result["found"]["gimbal.travel_deg"];
+        for (std::size_t g = 0; g < 3; ++g) {
+            const auto channel = static_cast<std::size_t>(rig->channel[g]);
+            const double reading = rig->degrees[g] * start[channel];
+            const double most = rig->travel_deg[g];
+            const auto low = found[g][0].get<double>(), high = found[g][1].get<double>();
+            EXPECT_GE(low, -360);
+            EXPECT_LE(high, 360);
+            // Of the same cables: each end as far from the start as it was stated, in deg.
+            const double turns = std::round(((low + high) / 2 - reading) / 360);
+            const double tolerance = 0.2 + 0.001 * most;  // written to 0.1; the ratio measured
+            EXPECT_NEAR(low, reading + 360 * turns - most, tolerance);
+            EXPECT_NEAR(high, reading + 360 * turns + most, tolerance);
+            beyond_a_turn += std::abs(reading) + most > 360 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(beyond_a_turn, 3);
+}
+
 }  // namespace
 }  // namespace vibrig::commission

@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 
+#include "daemon/commission/progress.hpp"
 #include "tests/unit/daemon/commission/commissioned.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -188,6 +191,28 @@ TEST_F(Resumed, WhatMakesNoSenseBeginsAnew) {
         EXPECT_EQ(question(), "power");
         pass(3);
         EXPECT_EQ(slews, before);
+    }
+}
+
+TEST_F(Resumed, AFileThatSomebodyHasWrittenOtherwiseIsNothingToGoOnWith) {
+    const TemporaryFolder folder;
+    const Progress progress(folder.string(), "a rig");
+    constexpr std::int64_t kNow = 1'795'000'000'000'000'000;
+    progress.write("Ada", false, Json::array(), kNow);
+    ASSERT_EQ(progress.read("Ada", false, kNow).why_not, "");
+    std::ifstream in(folder / "progress.json");
+    const Json written = Json::parse(in);
+    for (const auto& [key, value] : written.items()) {
+        if (key == "rig") continue;
+        for (const Json& other : {Json(), Json("x"), Json(5), Json(false), Json{{"a", 1}}}) {
+            if (other.type() == value.type() || (value.is_number() && other.is_number())) continue;
+            Json bad = written;
+            bad[key] = other;
+            std::ofstream(folder / "progress.json") << bad;
+            std::string why_not;
+            ASSERT_NO_THROW(why_not = progress.read("Ada", false, kNow).why_not) << bad;
+            EXPECT_THAT(why_not, HasSubstr("not what vibrigd wrote")) << bad;
+        }
     }
 }
 
