@@ -101,6 +101,7 @@ struct Configuration {
         std::string file;  ///< instead of psd; relative to the configuration's folder
         int number = 0;    ///< in the controller; 0: not stated
         bool at_table = false;
+        bool states_at = false, states_direction = false;  ///< itself, perhaps beside a file
         /// At the table, as the controller reports it; empty: as `profile` has it.
         std::vector<std::pair<double, double>> controller_psd{};
     };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -51,6 +52,16 @@ class CrossCheck {
     void sweeps_of_plan();
     void writable_registers_apart();
     void set_points_fit();
+    void set_points_of_plan_fit();
+    /// What is written to a register, and how near to it the register's step has to come.
+    struct SetPoint {
+        double value;
+        const char* unit;
+        double near = std::numeric_limits<double>::infinity();
+    };
+    /// `from`: the key that asks for it; `where` stands before what was found.
+    void held(const proto::Register& reg, const std::string& role, const SetPoint& value,
+              const char* from, const std::string& where = {});
     void limits();
     void frequency();
     void inputs();

@@ -110,6 +110,24 @@ void take_mount(Configuration& c, const Places& places) {
             c.estimator.frequency_hz, std::min(c.estimator.transmission, 0.999), s.pads_damping);
 }
 
+/// What a [[profile]] and its file both say has to be the same.
+void refuse_two_words(const Configuration::NamedProfile& one, const plan::StatedProfile& of_file,
+                      Place place, Problems& problems) {
+    const auto blame = [&](const char* key, const std::string& found, const std::string& there) {
+        problems.add(place, "profile (" + one.profile.name + ")." + key, found,
+                     "that of " + one.file + ", " + there);
+    };
+    const auto word = [](bool at_table) { return at_table ? "table" : "platform"; };
+    if (one.states_at && !of_file.at.empty() && of_file.at != word(one.at_table))
+        blame("at", word(one.at_table), of_file.at);
+    const auto &here = one.profile.direction, &there = of_file.profile.direction;
+    constexpr double kSame = 1e-6;
+    if (one.states_direction && !std::ranges::equal(here, there, [](double a, double b) {
+            return std::abs(a - b) < kSame;
+        }))
+        blame("direction", write_triple(here), write_triple(there));
+}
+
 /// Profiles that stand in files of their own.
 void take_profiles(Configuration& c, const std::filesystem::path& folder, Place place,
                    Problems& problems) {
@@ -121,6 +139,7 @@ void take_profiles(Configuration& c, const std::filesystem::path& folder, Place 
             stated.profile.name = one.profile.name;
             if (one.profile.g_rms > 0) stated.profile.g_rms = one.profile.g_rms;
             estimator::spectrum::check(stated.profile, one.file + ": ");
+            refuse_two_words(one, stated, place, problems);
             one.profile = stated.profile;
             if (!stated.at.empty()) one.at_table = stated.at == "table";
         } catch (const std::exception& error) {

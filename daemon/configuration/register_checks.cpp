@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,10 @@ using proto::Access;
 using proto::Register;
 using proto::RegisterTable;
 using proto::RegisterType;
+
+// How near to what is asked for a register has to come. The campaign reads frequencies back as near
+// (Excitation::chosen, SweepReading::is); a level is recorded as it was asked for.
+constexpr double kWritten_hz = 1e-3, kSweepEnd_hz = 9e-3, kWritten_db = 1e-3;
 
 }  // namespace
 
@@ -177,27 +182,58 @@ void CrossCheck::set_points_fit() {
         return;
     }
     const proto::ShakerRegisters& r = c_.shaker.registers;
-    const auto check = [this](const Register& reg, const std::string& role, double value,
-                              const std::string& unit, const char* from) {
-        const double most = row_of(reg.type).largest * reg.scale;
-        if (value > most) {
-            const std::string key = "shaker.registers." + role;
-            refuse({key + ".type", key + ".scale", from},
-                   plain(value) + " " + unit + " to be written",
-                   "a register that holds it (" + rounded(most) + " " + unit + " at most)");
-        }
-    };
-    if (sound({"campaign.table_g"})) {
-        check(r.amplitude, "amplitude",
-              *std::max_element(c_.campaign.table_g.begin(), c_.campaign.table_g.end()), "g",
-              "campaign.table_g");
+    if (sound({"campaign.table_g"}) && c_.campaign.stops.empty()) {
+        held(r.amplitude, "amplitude",
+             {*std::max_element(c_.campaign.table_g.begin(), c_.campaign.table_g.end()), "g"},
+             "campaign.table_g");
     }
     if (sound({"vibration.frequency_hz"})) {
-        check(r.frequency, "frequency", c_.estimator.frequency_hz, "Hz", "vibration.frequency_hz");
+        held(r.frequency, "frequency", {c_.estimator.frequency_hz, "Hz", kWritten_hz},
+             "vibration.frequency_hz");
     }
     if (sound({"campaign.ramp_s"})) {
-        check(r.ramp_time, "ramp_time", c_.campaign.ramp_s, "s", "campaign.ramp_s");
+        held(r.ramp_time, "ramp_time", {c_.campaign.ramp_s, "s"}, "campaign.ramp_s");
     }
+    if (sound({"campaign.plan"})) set_points_of_plan_fit();
+}
+
+void CrossCheck::set_points_of_plan_fit() {
+    const proto::ShakerRegisters& r = c_.shaker.registers;
+    for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
+        const auto& stop = c_.campaign.stops[i];
+        const std::string dwell = "dwell " + std::to_string(i + 1) + ": ";
+        const auto check = [&](const Register& reg, const char* role, const SetPoint& value) {
+            held(reg, role, value, "campaign.plan", dwell);
+        };
+        if (stop.random) {
+            if (r.random)
+                check(r.random->profile_level_db, "profile_level_db",
+                      {stop.random->set_point.level_db, "dB", kWritten_db});
+            continue;
+        }
+        check(r.amplitude, "amplitude", {stop.table_g, "g"});
+        if (stop.frequency_hz > 0)
+            check(r.frequency, "frequency", {stop.frequency_hz, "Hz", kWritten_hz});
+        if (!stop.sweep.any() || !r.sweep) continue;
+        check(r.sweep->from, "sweep_from", {stop.sweep.from_hz, "Hz", kSweepEnd_hz});
+        check(r.sweep->to, "sweep_to", {stop.sweep.to_hz, "Hz", kSweepEnd_hz});
+    }
+}
+
+void CrossCheck::held(const Register& reg, const std::string& role, const SetPoint& value,
+                      const char* from, const std::string& where) {
+    const std::string key = "shaker.registers." + role;
+    const auto blame = [&](const std::string& expected) {
+        refuse({key + ".type", key + ".scale", from},
+               where + plain(value.value) + " " + value.unit + " to be written", expected);
+    };
+    const double most = row_of(reg.type).largest * reg.scale;
+    if (std::abs(value.value) > most)
+        return blame("a register that holds it (" + rounded(most) + " " + value.unit + " at most)");
+    if (reg.type == RegisterType::f32) return;
+    const double written = std::round(value.value / reg.scale) * reg.scale;
+    if (std::abs(written - value.value) > value.near)
+        blame("a multiple of " + plain(reg.scale) + " " + value.unit + ", the step of " + key);
 }
 
 }  // namespace vibrig::configuration

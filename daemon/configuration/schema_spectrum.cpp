@@ -99,8 +99,10 @@ class ProfileReader {
                 to.profile.g_rms = of.number({1e-6, 1e4}, "g").value_or(0);
             } else if (part == "direction") {
                 direction(of, to.profile);
+                to.states_direction = true;
             } else if (part == "at") {
                 at(of, to.at_table);
+                to.states_at = true;
             } else {
                 of.refuse("an unknown key",
                           "name, number, psd, file, controller_psd, g_rms, direction or at");

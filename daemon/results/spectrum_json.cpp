@@ -175,6 +175,7 @@ Json held_out_json(const SpectrumResult& of) {
 
 using ReadJson = nlohmann::json;
 
+constexpr std::size_t kLongestSentence = 1000;  ///< of a verdict: its reasons are of use whole
 constexpr double kMost = 1e12;  ///< of a coefficient, deg/h/g^2; beyond it sums are no numbers
 constexpr double kMostHz = 1e5;
 constexpr double kMostElevation = 2;  ///< as of the configuration's site.elevation_deg
@@ -460,7 +461,8 @@ ResultVerdict read_verdict(const nlohmann::json& root, const std::string& path) 
         refuse(place + "level", shown(level), "0 (valid), 1 (doubtful) or 2 (not valid)");
     const auto& sentence = member(*found, "sentence", place);
     if (!sentence.is_string()) refuse(place + "sentence", shown(sentence), "a text");
-    return {level == 1, level == 2, proto::printable(sentence.get<std::string>())};
+    return {level == 1, level == 2,
+            proto::printable(sentence.get<std::string>(), kLongestSentence)};
 }
 
 }  // namespace vibrig::tool

@@ -40,7 +40,10 @@ std::uint64_t checked_hop(const DynamicSettings& settings) {
         throw DataError("overlap: must be at least 0 and below 1, got " +
                         std::to_string(settings.overlap));
     }
-    const double hop = static_cast<double>(settings.window) * (1 - settings.overlap);
+    // 1 - 0.9 is a hair less than a tenth.
+    constexpr double kRounding = 1e-12;
+    const double hop =
+        static_cast<double>(settings.window) * (1 - settings.overlap) * (1 + kRounding);
     return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(hop));
 }
 

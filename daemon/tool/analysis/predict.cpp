@@ -34,7 +34,8 @@ using PredictionJson = nlohmann::ordered_json;
 constexpr double kNotedBeyond = 1.5, kMostBeyond = 3;
 
 struct PredictOptions {
-    std::string result, profile, config, at = "platform", recording;
+    std::string result, profile, config, recording;
+    std::optional<std::string> at;
     std::vector<std::string> attitudes;
     double seconds = 0;
     std::optional<double> elastic_beyond, tolerance;
@@ -298,8 +299,7 @@ Predicted predict_for(const PredictOptions& options) {
     const auto rig = configuration::load(options.config, false).configuration;
     const plan::StatedProfile stated = find_profile(options.profile, rig);
     out.profile = stated.profile;
-    const AtPlatform vibration =
-        at_platform(out.profile, stated.at.empty() ? options.at : stated.at, rig);
+    const AtPlatform vibration = at_platform(out.profile, where_it_holds(stated, options.at), rig);
     if (vibration.behind_pads && !vertical(vibration.moment))
         add_note(out,
                  "the isolators' transmission is measured along the vertical, and is taken for "
@@ -359,7 +359,10 @@ void add_predict(CLI::App& app, int& exit_code) {
         .add_option("--attitude", options.attitudes,
                     "ALPHA,BETA,GAMMA of the gimbals (no encoder readings), deg; again for more")
         ->allow_extra_args(false);
-    command.add_option("--at", options.at, "where the profile holds: platform, or table (pads)")
+    command
+        .add_option("--at", options.at,
+                    "where the profile holds, if it does not say: platform (default), or table "
+                    "(pads)")
         ->check(CLI::IsMember({"platform", "table"}));
     add_number(command, "--seconds", options.seconds,
                "mean over so long: what a random vibration's realisation varies is added",

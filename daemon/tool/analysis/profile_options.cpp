@@ -31,6 +31,14 @@ plan::StatedProfile find_profile(const std::string& name, const configuration::C
     return plan::read_profile(name);
 }
 
+std::string where_it_holds(const plan::StatedProfile& stated,
+                           const std::optional<std::string>& asked) {
+    if (asked && !stated.at.empty() && *asked != stated.at)
+        throw std::runtime_error("--at: found " + *asked + ", expected " + stated.at +
+                                 ", where the profile '" + stated.profile.name + "' holds");
+    return stated.at.empty() ? asked.value_or("platform") : stated.at;
+}
+
 double strongest_g_rms(const nlohmann::json& result) {
     const auto rows = result.find("dwell_rates");
     if (rows == result.end() || !rows->is_array()) return 0;

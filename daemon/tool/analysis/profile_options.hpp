@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,12 @@ struct AtPlatform {
 [[nodiscard]] AtPlatform at_platform(const estimator::spectrum::Profile& profile,
                                      const std::string& at,
                                      const configuration::Configuration& rig);
+
+/// "platform" or "table": what the profile says itself, as a [[profile]] of the configuration
+/// always does; else what is asked for, else "platform". Throws std::runtime_error where the two
+/// differ.
+[[nodiscard]] std::string where_it_holds(const plan::StatedProfile& stated,
+                                         const std::optional<std::string>& asked);
 
 /// Of the strongest dwell of a result (vibrig identify --json) at the platform, g rms; 0: it does
 /// not say.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string_view>
 
 #include "daemon/plan/number_table.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
@@ -46,7 +47,12 @@ Pairs pairs_of(const SpectraJson& list, const std::string& key, const std::strin
 
 /// lines, profile or psd: one of them.
 StatedSpectrum stated_of(const SpectraJson& entry, const std::string& place) {
+    std::vector<std::string_view> keys;
+    for (const auto& one : entry.items()) keys.emplace_back(one.key());
+    plan::refuse_misspelt(keys, {"run", "position", "lines", "psd", "profile", "level_db"},
+                          [&place](const std::string& key) { return place + key; });
     StatedSpectrum of;
+    of.place = place;
     int count = 0;
     if (const auto found = entry.find("lines"); found != entry.end()) {
         of.lines = pairs_of(*found, place + "lines", "[hz, g_peak]");
@@ -143,6 +149,16 @@ Spectra read_spectra(const std::string& path) {
     return spectra;
 }
 
+void DwellKinds::expect_listed(const std::string& file) const {
+    for (const auto& [key, stated] : spectra_) {
+        if (!dwells_.contains(key))
+            plan::refuse(stated.place + "run",
+                         "run " + std::to_string(key.first) + ", position " +
+                             std::to_string(key.second) + ", of which there is no dwell",
+                         "one of " + file);
+    }
+}
+
 void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
                      const std::vector<std::string>& profiles, const std::string& file) {
     const proto::RecordingRow& first = *rows.front();
@@ -159,6 +175,7 @@ void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
             plan::refuse(line(*row) + "column profile",
                          "another profile or level than in the row before", "one in a dwell");
     }
+    dwells_.emplace(first.run, first.position);
     const auto found = spectra_.find({first.run, first.position});
     said_.push_back(found != spectra_.end() || first.profile > 0 ? Said::stated
                     : first.frequency_hz < 0                     ? Said::configuration

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ struct StatedSpectrum {
     std::string profile;                           ///< a name or a number; empty: lines
     std::vector<std::pair<double, double>> psd;    ///< of the profile, where it is stated here
     double level_db = 0;                           ///< about the profile
+    std::string place = {};                        ///< in the file, before a key of it
 };
 /// For runs and positions.
 using Spectra = std::map<std::pair<int, int>, StatedSpectrum>;
@@ -38,6 +40,9 @@ class DwellKinds {
     /// frequency or the profile changes within it, and where a profile is not known.
     void add(const std::vector<const proto::RecordingRow*>& rows,
              const std::vector<std::string>& profiles, const std::string& file);
+    /// Once all dwells are there. Throws where the spectra list one that the recording has not: it
+    /// is a slip, and the dwell that was meant has the configuration's frequency.
+    void expect_listed(const std::string& file) const;
     [[nodiscard]] const std::vector<estimator::spectrum::Kind>& kinds() const { return kinds_; }
     /// None: at rest, by what the recording says.
     [[nodiscard]] const std::optional<std::size_t>& of(std::size_t dwell) const {
@@ -70,6 +75,7 @@ class DwellKinds {
     std::vector<std::optional<std::size_t>> of_dwell_;
     std::vector<estimator::RandomVibration> random_;
     std::vector<Said> said_;
+    std::set<std::pair<int, int>> dwells_;  ///< runs and positions
 };
 
 }  // namespace vibrig::tool

@@ -414,6 +414,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     auto sweeps = take_sweeps(dwells, settings, file);
     DwellKinds kinds(rig, request.spectra);
     for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
+    kinds.expect_listed(file);
     std::vector<std::size_t> set_points_at_rest;
     while (true) {
         expect_sine(kinds, request, file);

@@ -1,7 +1,9 @@
+#include <fstream>
 #include <string>
 
 #include "tests/unit/daemon/configuration/spectrum_keys.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -110,6 +112,65 @@ TEST(SpectrumKeys, RegistersOfSweepsAreAllThereOrNone) {
     input.replace(input.find("type = \"u32\""), 0, "table = \"input\", ");
     EXPECT_THAT(complaint(input, true), AllOf(HasSubstr("shaker.registers.sweep_from.table"),
                                               HasSubstr("this register is written")));
+}
+
+/// Else a campaign ends hours later, where it reads back what it has not asked for.
+TEST(SetPointsOfAPlan, AreHeldByTheirRegisters) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("plan.json");
+    const auto said = [&](const std::string& run, const std::string& registers) {
+        std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3,"frequency_hz":15},)"
+                            << R"({"position":[0,0,0],)" << run << "}]}";
+        return complaint("campaign.plan = \"" + path +
+                             "\"\ncampaign.identify = \"what-it-can\"\n"
+                             "spectrum.mount = \"hard\"\n" +
+                             registers,
+                         true);
+    };
+    const std::string u16 = "shaker.registers.frequency = { type = \"u16\", scale = ";
+    const std::string at_85 = R"("table_g":3,"frequency_hz":85.1)";
+    EXPECT_EQ(said(at_85, ""), "");
+    EXPECT_EQ(said(at_85, u16 + "0.1 }\n"), "");
+    EXPECT_THAT(said(at_85, u16 + "0.001 }\n"),
+                HasSubstr("found dwell 2: 85.1 Hz to be written, expected a register that holds it "
+                          "(65.535 Hz at most)"));
+    EXPECT_THAT(said(R"("table_g":3,"frequency_hz":85.05)", u16 + "0.1 }\n"),
+                HasSubstr("found dwell 2: 85.05 Hz to be written, expected a multiple of 0.1 Hz, "
+                          "the step of shaker.registers.frequency"));
+    EXPECT_THAT(
+        said(R"("table_g":7,"frequency_hz":85.1)", "shaker.registers.amplitude.type = \"u16\"\n"),
+        HasSubstr("found dwell 2: 7 g to be written, expected a register that holds it (6.5535 g"));
+
+    const std::string random = "spectrum.mode = \"mixed\"\n" + kRandomRegisters +
+                               profile_with("psd = [[20, 0.02], [120, 0.02]]\nnumber = 4\n");
+    const auto at_level = [&](const std::string& db) {
+        return said(R"("profile":"p","level_db":)" + db, random);
+    };
+    for (const char* db : {"0", "-1.5", "0.3", "-0.7"}) EXPECT_EQ(at_level(db), "") << db;
+    // -1.53 would be played as -1.5 and recorded as -1.53.
+    for (const char* db : {"-1.53", "-1.55"})
+        EXPECT_THAT(at_level(db),
+                    HasSubstr(std::string("found dwell 2: ") + db +
+                              " dB to be written, expected a multiple of 0.1 dB, the step of "
+                              "shaker.registers.profile_level_db"));
+}
+
+TEST(SetPointsOfAPlan, AreHeldByTheRegistersOfItsSweeps) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("plan.json");
+    std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3,"frequency_hz":15},)"
+                        << R"({"position":[0,0,0],"table_g":3,)"
+                        << R"("sweep":{"from_hz":20,"to_hz":120,"s":100}}]})";
+    const std::string text = "campaign.plan = \"" + path +
+                             "\"\ncampaign.identify = \"what-it-can\"\ncan.sample_rate_hz = 200\n"
+                             "spectrum.mount = \"hard\"\nspectrum.mode = \"mixed\"\n";
+    EXPECT_EQ(complaint(text + kSweepRegisters, true), "");
+    std::string narrow = kSweepRegisters;
+    const std::string to = "sweep_to = { address = 13, type = \"u32\"";
+    narrow.replace(narrow.find(to), to.size(), "sweep_to = { address = 13, type = \"u16\"");
+    EXPECT_THAT(complaint(text + narrow, true),
+                HasSubstr("found dwell 2: 120 Hz to be written, expected a register that holds it "
+                          "(65.535 Hz at most)"));
 }
 
 }  // namespace

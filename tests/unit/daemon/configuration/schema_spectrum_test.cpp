@@ -73,6 +73,28 @@ TEST(SpectrumKeys, AProfilesFileIsHeldToTheSame) {
     EXPECT_THAT(said(R"({"psd":[[20,0.04],[120,0.04]],"g_rms":3})"), HasSubstr("g_rms: found 3"));
 }
 
+/// Of two words one would be left aside, and the drift predicted for the other.
+TEST(SpectrumKeys, AProfileAndItsFileSayTheSame) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("profile.json");
+    const auto with = [&](const std::string& of_file, const std::string& keys) {
+        std::ofstream(path) << R"({"psd":[[20,0.01],[120,0.01]])" << of_file << "}";
+        return profile_with("file = \"" + path + "\"\n" + keys);
+    };
+    const std::string platform = R"(,"at":"platform")", north = R"(,"direction":[2,0,0])";
+    EXPECT_THAT(complaint(with(platform, "at = \"table\"\n"), false),
+                HasSubstr("profile (p).at: found table, expected that of " + path + ", platform"));
+    EXPECT_THAT(complaint(with("", "direction = [1, 0, 0]\n"), false),
+                HasSubstr("profile (p).direction: found [1.0, 0.0, 0.0], expected that of " + path +
+                          ", [0.0, 1.0, 0.0]"));
+    EXPECT_THAT(complaint(with(north, "direction = [0, 1, 0]\n"), false),
+                HasSubstr("profile (p).direction: found [0.0, 1.0, 0.0]"));
+    EXPECT_EQ(
+        complaint(with(platform + north, "at = \"platform\"\ndirection = [1, 0, 0]\n"), false), "");
+    // What the file leaves open the configuration says.
+    EXPECT_TRUE(accepted(with("", "at = \"table\"\n")).profiles.at(0).at_table);
+}
+
 TEST(SpectrumKeys, AHardMountHasATransmissionOfOne) {
     EXPECT_EQ(accepted("spectrum.mount = \"hard\"\n").estimator.transmission, 1);
     // Nor does the platform lag; what is stated stands.

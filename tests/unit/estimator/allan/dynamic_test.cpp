@@ -38,6 +38,20 @@ TEST(Dynamic, WindowsOverlapByHalfAndAreCentredAtTheirMiddle) {
     EXPECT_EQ(centres, (std::vector<double>{50, 100, 150, 200, 250, 300, 350}));
 }
 
+TEST(Dynamic, WindowsFollowEachOtherAsTheOverlapSays) {
+    // 1 - 0.9 and 1 - 0.8 are a hair less than a tenth and a fifth.
+    for (const auto& [overlap, hop] :
+         {std::pair{0.9, 10.0}, {0.8, 20.0}, {0.75, 25.0}, {0.7, 30.0}, {0.0, 100.0}}) {
+        DynamicAllan dynamic(settings(100, overlap));
+        std::vector<double> centres;
+        for (const double y : white(300, 1.0, 4)) {
+            if (dynamic.add(y)) centres.push_back(dynamic.row().centre_s);
+        }
+        ASSERT_GE(centres.size(), 2U);
+        EXPECT_EQ(centres[1] - centres[0], hop) << overlap;
+    }
+}
+
 TEST(Dynamic, AMeanRemovedWindowLosesTheVarianceOfItsMean) {
     // GIVEN Gauss-Markov noise, variance 1, windows of 3600 s, tm as in the table
     // THEN the variance after removal of the mean is 1 - sigma_c^2(T): 0.76 and 0.24

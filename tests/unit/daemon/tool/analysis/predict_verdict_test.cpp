@@ -25,9 +25,29 @@ TEST_F(Predict, AResultThatIsNotValidForetellsNothing) {
     const Ended doubtful = run(command + " --json");
     EXPECT_EQ(doubtful.exit_code, 0) << doubtful.error;
     EXPECT_EQ(doubtful.json()["prediction"]["note"], "the result is doubtful, because of the moon");
+    // Its reasons are of use whole.
+    const std::string why = "doubtful, because " + std::string(100, 'x') + " and the moon";
+    of["verdict"]["sentence"] = why;
+    write("moon.json", of.dump());
+    EXPECT_EQ(run(command + " --json").json()["prediction"]["note"], "the result is " + why);
     of["verdict"]["level"] = "2";
     write("moon.json", of.dump());
     EXPECT_THAT(run(command).error, HasSubstr("moon.json: verdict.level: found \"2\", expected 0"));
+}
+
+/// Else the drift is predicted for the other place, without a word.
+TEST_F(Predict, WhereAProfileHoldsIsSaidOnce) {
+    write("flat.json", R"({"name": "flat", "psd": [[20, 0.01], [120, 0.01]], "at": "platform"})");
+    write("road.toml", "[[profile]]\nname = \"road\"\npsd = [[20, 0.01], [120, 0.01]]\n");
+    const std::string command = "predict result.json --attitude 0,0,0 --profile ";
+    const Ended file = run(command + "flat.json --at table");
+    EXPECT_EQ(file.exit_code, 2) << file.out;
+    EXPECT_THAT(file.error, HasSubstr("--at: found table, expected platform, where the profile "
+                                      "'flat' holds"));
+    EXPECT_THAT(run(command + "road --config road.toml --at table").error,
+                HasSubstr("--at: found table, expected platform, where the profile 'road' holds"));
+    for (const char* same : {"flat.json --at platform", "truck --at table", "truck"})
+        EXPECT_NE(run(command + same).exit_code, 2) << same;
 }
 
 TEST_F(Predict, ASineIsProvenByDwellsAtItsLevel) {

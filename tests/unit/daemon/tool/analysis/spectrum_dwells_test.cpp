@@ -88,5 +88,26 @@ TEST_F(Predict, SpectraNeedNotListAllDwells) {
     }
 }
 
+/// Else the dwell that was meant has the configuration's frequency, without a word.
+TEST_F(Predict, SpectraListDwellsThatTheRecordingHas) {
+    ASSERT_EQ(plant("--truth truth.json --seed 5 --dwell 5 --table-g 6,0 -o plain.csv").exit_code,
+              0);
+    const auto refused = [&](const std::string& list, const std::string& with) {
+        write("spectra.json", "[" + list + "]");
+        const Ended ended = run("identify plain.csv --spectra spectra.json");
+        EXPECT_EQ(ended.exit_code, 2) << list;
+        EXPECT_THAT(ended.error, HasSubstr(with));
+    };
+    const std::string good = R"({"run": 1, "position": 1, "lines": [[15, 6]]}, )";
+    refused(good + R"({"run": 1, "position": 15, "lines": [[15, 6]]})",
+            "spectra.json: [1].run: found run 1, position 15, of which there is no dwell, expected "
+            "one of plain.csv");
+    refused(good + R"({"run": 3, "position": 1, "lines": [[15, 6]]})",
+            "spectra.json: [1].run: found run 3, position 1, of which");
+    refused(good + R"({"run": 1, "position": 2, "profile": "truck", "leveldb": -3})",
+            "spectra.json: [1].leveldb: found an unknown key, expected a known one, perhaps "
+            "level_db");
+}
+
 }  // namespace
 }  // namespace vibrig::tool
