@@ -200,6 +200,7 @@ void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
 }
 
 void CampaignDwells::take_done(campaign::Campaign& campaign) {
+    files_.try_again();
     keep_revised(campaign);
     rt::DwellDone done;
     while (with_.book.take_done(with_.stage, done)) {

@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <sys/stat.h>
 
+#include <cerrno>
 #include <ctime>
 #include <fstream>
 #include <system_error>
@@ -20,6 +21,7 @@ std::filesystem::path ResultFiles::path_of(bool complete) const {
 
 void ResultFiles::begin() {
     if (folder_.empty()) return;
+    waiting_.reset();
     for (const bool complete : {true, false}) put_aside(path_of(complete));
 }
 
@@ -41,6 +43,31 @@ void ResultFiles::put_aside(const std::filesystem::path& path) {
 
 void ResultFiles::write(const std::string& text, bool complete) {
     if (folder_.empty()) return;
+    waiting_.reset();
+    const auto path = path_of(complete).string();
+    if (const auto why = put(text, complete); !why.empty()) {
+        waiting_ = {text, complete, Steady::now()};
+        event_(Severity::alarm,
+               fmt::format("cannot write {}: {}; tried again until the next campaign begins", path,
+                           why));
+        return;
+    }
+    event_(Severity::info, fmt::format("{} result in {}", complete ? "complete" : "partial", path));
+}
+
+void ResultFiles::try_again(Steady::time_point now) {
+    constexpr auto kRetry = std::chrono::seconds(1);
+    if (!waiting_ || now - waiting_->tried < kRetry) return;
+    waiting_->tried = now;
+    if (!put(waiting_->text, waiting_->complete).empty()) return;
+    event_(Severity::info,
+           fmt::format("{} result in {} at last", waiting_->complete ? "complete" : "partial",
+                       path_of(waiting_->complete).string()));
+    waiting_.reset();
+}
+
+/// Why it could not be done; empty: it is done.
+std::string ResultFiles::put(const std::string& text, bool complete) const {
     const auto path = path_of(complete);
     auto unfinished = path;
     unfinished += ".new";
@@ -48,12 +75,11 @@ void ResultFiles::write(const std::string& text, bool complete) {
     file << text;
     file.close();
     std::error_code error;
-    if (file) std::filesystem::rename(unfinished, path, error);
-    if (!file || error)
-        event_(Severity::alarm, "cannot write " + path.string());
-    else
-        event_(Severity::info,
-               fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
+    if (!file) error.assign(errno != 0 ? errno : EIO, std::generic_category());
+    if (!error) std::filesystem::rename(unfinished, path, error);
+    std::error_code ignored;
+    if (error) std::filesystem::remove(unfinished, ignored);
+    return error ? error.message() : "";
 }
 
 }  // namespace vibrig

@@ -115,10 +115,8 @@ void Outbox::stop() noexcept {
 }
 
 void Outbox::look() {
-    {
-        const std::lock_guard lock(mutex_);
-        look_ = true;
-    }
+    const std::lock_guard lock(mutex_);
+    look_ = true;
     changed_.notify_all();
 }
 
@@ -342,7 +340,9 @@ void Outbox::ask_history() {
     add_unit(words);
     const Run run = run_child(command(std::move(words)), kPatience_s, stop_);
     if (run.status != 0) return;  // a new unit, or an archive that does not answer
-    if (!unit_.simulated && run.out.starts_with("SIMULATED")) return;  // no history of a real one
+    // Of a unit that was on no real rig these are of simulated ones: no history of a real one.
+    const auto root = nlohmann::json::parse(run.out, nullptr, false);
+    if (!unit_.simulated && (!root.is_object() || root.value("simulated", true))) return;
     const std::lock_guard lock(mutex_);
     history_ = run.out;
 }

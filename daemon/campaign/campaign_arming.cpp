@@ -79,6 +79,7 @@ std::string sweeps_text(const Stops& stops) {
 void Campaign::take_over_trip(const std::string& causes, double table_g) {
     state_ = State::tripped;
     reason_ = causes;
+    if (ports_.rig.torquer != nullptr) ports_.rig.torquer->doubt();
     // Nobody has seen rest since: silence is none.
     stop_.excited(table_g);
 }

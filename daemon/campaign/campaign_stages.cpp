@@ -56,7 +56,8 @@ void Campaign::leave_stage() {
 void Campaign::insist_on_zero_torque(Time now) {
     // Levelling torques by itself, and so does what is commissioned.
     if (ports_.rig.torquer == nullptr || state_ == State::levelling || commissioning()) return;
-    if (ports_.rig.torquer->zero() && !(active() && torquing(ports_.rig))) return;
+    const bool ours = active() || state_ == State::tripped;
+    if (ports_.rig.torquer->zero() && !(ours && torquing(ports_.rig))) return;
     if (now - torque_sent_ < kStagePoll) return;
     torque_sent_ = now;
     static_cast<void>(ports_.rig.torquer->command({}));

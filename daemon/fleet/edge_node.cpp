@@ -2,9 +2,7 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
-#include "daemon/status/values.hpp"
 #include "proto/sparkplug.pb.h"
 #include "proto/text.hpp"
 
@@ -12,68 +10,55 @@ namespace vibrig::fleet {
 namespace {
 
 using sparkplug::Payload;
-using Value = EdgeNode::Value;
 
 constexpr std::uint64_t kSequences = 256;
 constexpr const char* kRebirth = "Node Control/Rebirth";
 constexpr std::uint32_t kInt64 = 4, kBoolean = 11, kString = 12;
-constexpr std::array<std::uint32_t, 4> kTypes{kBoolean, 8, 10, kString};  // in Value's order
+constexpr std::array<std::uint32_t, 4> kTypes{kBoolean, 8, 10, kString};  // by StatusValue::kind
+constexpr std::size_t kNumber = 3;                                        // kind of a double
 
 struct Reading {
     std::string name;
     const char* unit;  ///< empty: none
-    Value value;
+    std::size_t kind;  ///< of the value where it is known: its type is that of the birth
+    StatusScalar value;
 };
-
-/// What is not known now: a number is null, the others are what they are without it.
-Value known_value(const StatusValue& row, const StatusData& status) {
-    static const std::array<Value, 4> kUnknown{
-        false, std::uint64_t{0}, std::numeric_limits<double>::quiet_NaN(), std::string()};
-    const StatusScalar value = row.value(status);
-    if (const auto* const flag = std::get_if<bool>(&value)) return *flag;
-    if (const auto* const count = std::get_if<std::uint64_t>(&value)) return *count;
-    if (const auto* const number = std::get_if<double>(&value)) return *number * row.mqtt_factor;
-    if (const auto* const text = std::get_if<std::string>(&value)) return *text;
-    return kUnknown[row.kind - 1];
-}
 
 /// The same rows in the same order for every status: an alias is a row's place.
 std::vector<Reading> readings_of(const StatusData& s) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     std::vector<Reading> readings;
-    for (const StatusValue& row : status_values())
-        if (row.mqtt_name != nullptr)
-            readings.push_back({row.mqtt_name, row.unit, known_value(row, s)});
-    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
-        const bool known = s.estimate.observable[i];
-        const std::string name = std::string("Coefficients/") + estimator::parameter_names()[i];
-        const char* const unit = estimator::parameter_unit(i);
-        readings.push_back({name + "/Value", unit, known ? s.estimate.value[i] : kNone});
-        readings.push_back({name + "/Sigma", unit, known ? s.estimate.sigma[i] : kNone});
-    }
-    for (Reading& reading : readings) {
+    for (const StatusValue& row : status_values()) {
+        if (row.mqtt_name == nullptr) continue;
+        Reading& reading =
+            readings.emplace_back(Reading{row.mqtt_name, row.unit, row.kind, row.value(s)});
+        if (auto* const number = std::get_if<double>(&reading.value)) *number *= row.mqtt_factor;
         if (auto* const text = std::get_if<std::string>(&reading.value))
             *text = proto::mend_utf8(*text);
+    }
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto known = [&](double value) {
+            return s.estimate.observable[i] && std::isfinite(value) ? StatusScalar(value)
+                                                                    : StatusScalar();
+        };
+        const std::string name = std::string("Coefficients/") + estimator::parameter_names()[i];
+        const char* const unit = estimator::parameter_unit(i);
+        readings.push_back({name + "/Value", unit, kNumber, known(s.estimate.value[i])});
+        readings.push_back({name + "/Sigma", unit, kNumber, known(s.estimate.sigma[i])});
     }
     return readings;
 }
 
-bool same(const Value& a, const Value& b) {
-    const auto* const x = std::get_if<double>(&a);
-    const auto* const y = std::get_if<double>(&b);
-    return a == b || (x != nullptr && y != nullptr && std::isnan(*x) && std::isnan(*y));
-}
-
-void set(Payload::Metric& metric, const Value& value) {
-    metric.set_datatype(kTypes[value.index()]);
-    if (const auto* const yes = std::get_if<bool>(&value)) {
+/// What is not known now is null, whatever it is: a flag that nobody has read is not `false`.
+void set(Payload::Metric& metric, const Reading& reading) {
+    metric.set_datatype(kTypes[reading.kind - 1]);
+    if (const auto* const yes = std::get_if<bool>(&reading.value)) {
         metric.set_boolean_value(*yes);
-    } else if (const auto* const count = std::get_if<std::uint64_t>(&value)) {
+    } else if (const auto* const count = std::get_if<std::uint64_t>(&reading.value)) {
         metric.set_long_value(*count);
-    } else if (const auto* const text = std::get_if<std::string>(&value)) {
+    } else if (const auto* const text = std::get_if<std::string>(&reading.value)) {
         metric.set_string_value(*text);
-    } else if (const double number = std::get<double>(value); std::isfinite(number)) {
-        metric.set_double_value(number);
+    } else if (const auto* const number = std::get_if<double>(&reading.value)) {
+        metric.set_double_value(*number);
     } else {
         metric.set_is_null(true);
     }
@@ -125,7 +110,7 @@ std::string EdgeNode::birth(const StatusData& status) {
             unit.set_type(kString);
             unit.set_string_value(reading.unit);
         }
-        set(metric, reading.value);
+        set(metric, reading);
         published_.push_back(std::move(reading.value));
     }
     return payload.SerializeAsString();
@@ -136,11 +121,11 @@ std::string EdgeNode::data(const StatusData& status) {
     payload.set_timestamp(milliseconds_of(status.utc_ns));
     std::vector<Reading> readings = readings_of(status);
     for (std::size_t i = 0; i < readings.size() && i < published_.size(); ++i) {
-        if (same(readings[i].value, published_[i])) continue;
+        if (readings[i].value == published_[i]) continue;
         Payload::Metric& metric = *payload.add_metrics();
         metric.set_alias(i);
         metric.set_timestamp(payload.timestamp());
-        set(metric, readings[i].value);
+        set(metric, readings[i]);
         published_[i] = std::move(readings[i].value);
     }
     if (payload.metrics_size() == 0) return {};

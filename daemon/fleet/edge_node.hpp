@@ -3,10 +3,9 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
-#include "daemon/status/status.hpp"
+#include "daemon/status/values.hpp"
 
 namespace vibrig::fleet {
 
@@ -18,7 +17,7 @@ class EdgeNode {
     void next_session();
     /// For the broker to publish when the connection is lost.
     [[nodiscard]] std::string death(std::int64_t utc_ns) const;
-    /// All metrics with name, type, unit and alias.
+    /// All metrics with name, type, unit and alias; what is not known now is null.
     [[nodiscard]] std::string birth(const StatusData& status);
     /// What has changed since the payload before, by alias; empty: nothing has.
     [[nodiscard]] std::string data(const StatusData& status);
@@ -27,13 +26,10 @@ class EdgeNode {
     /// cannot move the rig. Bytes that are no payload ask for nothing.
     [[nodiscard]] static bool asks_for_birth(std::string_view payload);
 
-    /// Not a number: null.
-    using Value = std::variant<bool, std::uint64_t, double, std::string>;
-
   private:
     std::uint64_t session_ = 255;  ///< bdSeq, 0 to 255
     std::uint64_t sequence_ = 0;   ///< of the next payload, 0 to 255
-    std::vector<Value> published_;
+    std::vector<StatusScalar> published_;
 };
 
 }  // namespace vibrig::fleet

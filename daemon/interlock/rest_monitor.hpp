@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,6 +37,11 @@ struct RestWitness {
     /// Unknown because it has not been seen to move since it was doubted, or has lost the noise
     /// that it had at rest.
     bool doubted = false;
+    /// g; empty while unknown.
+    [[nodiscard]] std::optional<double> rms() const noexcept {
+        if (verdict != RestVerdict::moving && verdict != RestVerdict::still) return {};
+        return rms_g;
+    }
 };
 
 /// What all accelerometers show at one moment.

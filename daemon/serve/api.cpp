@@ -68,19 +68,41 @@ struct EventQuery {
     std::uint64_t limit = kDefaultEvents;
 };
 
+/// Without the escapes that a query needs: "a%2Cb" is "a,b". Throws std::invalid_argument.
+std::string unescaped(std::string_view text) {
+    std::string out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] != '%') {
+            out += text[i];
+            continue;
+        }
+        const std::string_view escape = text.substr(i, 3);
+        unsigned byte = 0;
+        const char* const end = escape.data() + escape.size();
+        const auto [stop, error] = std::from_chars(escape.data() + 1, end, byte, 16);
+        if (escape.size() < 3 || error != std::errc{} || stop != end)
+            throw std::invalid_argument("query: found " + in_quotes(escape) +
+                                        ", expected % and two hexadecimal digits");
+        out += static_cast<char>(byte);
+        i += 2;
+    }
+    return out;
+}
+
 /// Name and value of each pair in "a=1&b=2".
 void each_pair(std::string_view query, const auto& take) {
     while (!query.empty()) {
         const std::string_view pair = query.substr(0, query.find('&'));
         query.remove_prefix(std::min(pair.size() + 1, query.size()));
         const std::size_t equals = std::min(pair.find('='), pair.size());
-        take(pair.substr(0, equals), pair.substr(std::min(equals + 1, pair.size())));
+        take(unescaped(pair.substr(0, equals)),
+             unescaped(pair.substr(std::min(equals + 1, pair.size()))));
     }
 }
 
 EventQuery event_query(std::string_view query) {
     EventQuery result;
-    each_pair(query, [&result](std::string_view name, std::string_view value) {
+    each_pair(query, [&result](const std::string& name, const std::string& value) {
         const std::uint64_t number = parse_count(name, value);
         if (name == "after") {
             result.after = number;
@@ -159,7 +181,7 @@ void check_query(std::string_view path, std::string_view query) {
     std::string known;
     for (const std::string_view key : of == kReadable.end() ? Readable{}.keys : of->keys)
         if (!key.empty()) known += (known.empty() ? "" : " or ") + std::string(key);
-    each_pair(query, [&](std::string_view name, std::string_view) {
+    each_pair(query, [&](const std::string& name, const std::string&) {
         if (!name.empty() && of != kReadable.end() &&
             std::find(of->keys.begin(), of->keys.end(), name) != of->keys.end())
             return;
@@ -168,9 +190,9 @@ void check_query(std::string_view path, std::string_view query) {
     });
 }
 
-std::string_view query_value(std::string_view query, std::string_view name) {
-    std::string_view found;
-    each_pair(query, [&](std::string_view key, std::string_view value) {
+std::string query_value(std::string_view query, std::string_view name) {
+    std::string found;
+    each_pair(query, [&](const std::string& key, const std::string& value) {
         if (key == name && found.empty()) found = value;
     });
     return found;
@@ -267,6 +289,8 @@ ApiAnswer Api::document(const ApiRequest& request, std::string_view path, std::s
     Document found;
     try {
         found = documents_(path, query);
+    } catch (const std::invalid_argument&) {
+        throw;  // of the query
     } catch (const std::exception& error) {
         return problem(503, error.what());
     }

@@ -92,11 +92,12 @@ class Api {
 };
 
 /// Throws std::invalid_argument that names what `path` does not know in its query, and what it
-/// does.
+/// does; or an escape that is none.
 void check_query(std::string_view path, std::string_view query);
 
-/// The value of `name` in "a=1&b=2"; empty: it is not there.
-[[nodiscard]] std::string_view query_value(std::string_view query, std::string_view name);
+/// The value of `name` in "a=1&b=2", its escapes taken out; empty: it is not there. Throws
+/// std::invalid_argument for an escape that is none.
+[[nodiscard]] std::string query_value(std::string_view query, std::string_view name);
 
 /// Throws std::invalid_argument that names it unless it is a whole number.
 [[nodiscard]] std::uint64_t parse_count(std::string_view name, std::string_view text);

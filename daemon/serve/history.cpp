@@ -42,7 +42,7 @@ std::array<double, History::kChannels.size()> values_of(
             s.command_table_g,
             s.shaker.valid ? s.shaker.amplitude_g : kNone,
             s.shaker.valid ? s.shaker.frequency_hz : kNone,
-            s.platform.time != 0 ? s.platform.temperature_c : kNone,
+            s.platform_state() == ChannelState::good ? s.platform.temperature_c : kNone,
             filters ? s.estimate.innovation_arcsec[0] : kNone,
             filters ? s.estimate.innovation_arcsec[1] : kNone,
             filters ? s.estimate.innovation_arcsec[2] : kNone,

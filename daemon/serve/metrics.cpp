@@ -133,10 +133,12 @@ void add_shaker(Families& to, const StatusData& s) {
     to.gauge("vibrig_witness_meters_per_second_squared",
              "Peak acceleration at the table as an accelerometer shows it.", witnesses);
     const auto& [platform, table] = s.rest.witnesses;
-    to.gauge("vibrig_rest_rms_meters_per_second_squared",
-             "Of the accelerometers, less the mean; 0 while unknown.",
-             {{{{"body", "platform"}}, platform.rms_g * kGravity},
-              {{{"body", "table"}}, table.rms_g * kGravity}});
+    std::vector<std::pair<Labels, double>> rest;
+    for (const auto& [body, witness] : {std::pair{"platform", platform}, {"table", table}})
+        if (const auto rms = witness.rms())
+            rest.emplace_back(Labels{{"body", body}}, *rms * kGravity);
+    to.gauge("vibrig_rest_rms_meters_per_second_squared", "Of the accelerometers, less the mean.",
+             rest);
     to.counter("vibrig_shaker_requests_total", "Modbus requests by how they ended.",
                {{{{"result", "reply"}}, n.replies},
                 {{{"result", "timeout"}}, n.timeouts},
@@ -224,7 +226,8 @@ void add_estimate(Families& to, const StatusData& s) {
     std::vector<std::pair<Labels, double>> innovations, walks, sigma_walks, in_force;
     for (std::size_t j = 0; j < kAxisLabels.size(); ++j) {
         const Labels axis{{"axis", kAxisLabels[j]}};
-        innovations.emplace_back(axis, e.innovation_arcsec[j] * estimator::kRadPerArcsec);
+        if (e.samples > 0)
+            innovations.emplace_back(axis, e.innovation_arcsec[j] * estimator::kRadPerArcsec);
         const auto& gyro = s.noise.gyros[j];
         const auto& n = gyro.terms[static_cast<std::size_t>(estimator::allan::Term::N)];
         in_force.emplace_back(axis, gyro.in_force);

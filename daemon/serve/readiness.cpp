@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "daemon/serve/expiry_watch.hpp"
@@ -62,7 +63,10 @@ Readiness readiness(const StatusData& status) {
         !status.shaker.valid                ? "no reading"
         : status.shaker.emergency_stop_open ? "open"
                                             : "closed");
-    add("rest", !status.stop_pending && !status.rest.disobeyed,
+    // In a campaign it moves as it is commanded; what is not seen is not at rest.
+    add("rest",
+        !status.stop_pending && !status.rest.disobeyed &&
+            std::string_view(status.rest.state) != "unknown",
         std::string(status.rest.state) +
             (status.rest.disobeyed ? ", press the emergency stop" : "") +
             (status.rest.what.empty() ? "" : ": " + status.rest.what));

@@ -188,15 +188,27 @@ std::string problem_json(int status, const std::string& title, const std::string
 CommandRequest parse_command(const std::string& json) {
     refuse_repeated_keys(json);
     v1::Command message;
-    const auto parsed = google::protobuf::util::JsonStringToMessage(json, &message);
-    if (!parsed.ok()) {
-        throw std::invalid_argument("not a Command in JSON: " + std::string(parsed.message()));
+    if (const auto parsed = google::protobuf::util::JsonStringToMessage(json, &message);
+        !parsed.ok()) {
+        google::protobuf::util::JsonParseOptions lenient;
+        lenient.ignore_unknown_fields = true;
+        message.Clear();
+        if (!google::protobuf::util::JsonStringToMessage(json, &message, lenient).ok() ||
+            message.kind() != v1::Command::abort)
+            throw std::invalid_argument("not a Command in JSON: " + std::string(parsed.message()));
     }
     CommandRequest request;
     request.kind = kind_of(message.kind());
     request.by = message.by();
     request.argument = message.argument();
-    if (request.by.find_first_not_of(' ') == std::string::npos) {
+    const bool nameless = request.by.find_first_not_of(' ') == std::string::npos;
+    if (request.kind == CommandRequest::Kind::abort) {
+        // A stop does not wait for a better name, nor for what is beside it.
+        request.by = nameless ? "somebody" : proto::printable(request.by, kLongestName);
+        request.argument = proto::printable(request.argument, kLongestArgument);
+        return request;
+    }
+    if (nameless) {
         throw std::invalid_argument("by: empty, expected the name of the person who commands");
     }
     check_line("by", request.by, kLongestName);

@@ -167,6 +167,7 @@ void fill(v1::Estimate& out, const StatusData& status) {
     }
     fill_values(out, "estimate.", status);
     v1::Innovation& innovation = *out.mutable_innovation();
+    if (estimate.samples == 0) return;
     set(innovation, &v1::Innovation::set_x_arcsec, estimate.innovation_arcsec[0]);
     set(innovation, &v1::Innovation::set_y_arcsec, estimate.innovation_arcsec[1]);
     set(innovation, &v1::Innovation::set_z_arcsec, estimate.innovation_arcsec[2]);

@@ -50,6 +50,9 @@ TcpListener listen_tcp(const std::string& key, const std::string& address, bool 
         fail("expected an address of this machine's loopback: 127.0.0.1 or [::1]");
     const int fd = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     const int on = 1;
+    // At boot the machine's address may come after this program, or much later; until then the door
+    // is shut, which is watched and shown.
+    if (fd >= 0 && !loopback_only) ::setsockopt(fd, SOL_IP, IP_FREEBIND, &on, sizeof on);
     if (fd < 0 || ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
         ::bind(fd, found->ai_addr, found->ai_addrlen) != 0 || ::listen(fd, kTcpBacklog) != 0) {
         const std::string why = std::generic_category().message(errno);

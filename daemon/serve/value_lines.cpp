@@ -60,7 +60,9 @@ std::string said(const StatusValue& row, const v1::Status& status) {
     } else if (const auto* const number = std::get_if<double>(&value)) {
         text = number_text(row, *number);
     } else {
-        if (!is_number(row) || row.otherwise != nullptr) return otherwise;
+        // A flag that is not known is no flag that is not set.
+        if (!is_number(row)) return {};
+        if (row.otherwise != nullptr) return otherwise;
         text = *row.unit == '\0' ? std::string("-") : std::string("- ") + row.unit;
     }
     std::string all = row.words;

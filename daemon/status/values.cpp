@@ -53,19 +53,20 @@ std::optional<Value> only(bool known, Value value) {
     return known ? std::optional<Value>(value) : std::nullopt;
 }
 
-std::optional<double> rms_of(const rt::RestWitness& witness) {
-    return only(
-        witness.verdict == rt::RestVerdict::moving || witness.verdict == rt::RestVerdict::still,
-        witness.rms_g);
-}
-
 std::uint64_t raised(const S& s) {
     std::uint64_t count = 0;
     for (const auto& one : s.interlock.rows) count += one.raised ? 1 : 0;
     return count;
 }
 
+/// Of a campaign: before its first sample what the filter has is no measurement.
+bool filters(const S& s) { return s.estimate.samples > 0; }
 bool platform_good(const S& s) { return s.platform_state() == ChannelState::good; }
+/// They have a message of their own, which may be silent alone.
+bool gimbals_good(const S& s) {
+    return s.platform.gimbal_time != 0 && !s.silent &&
+           drivers::to_seconds(s.time - s.platform.gimbal_time) <= s.platform_deadline_s;
+}
 
 // clang-format off
 const auto kValues = std::to_array<StatusValue>({
@@ -175,8 +176,8 @@ const auto kValues = std::to_array<StatusValue>({
                "1: a stop was not obeyed in its time: the emergency stop is to be pressed."),
     row("shaker.rest", "", [](auto& s) { return s.rest.state; }),
     row("shaker.not_at_rest", "", [](auto& s) { return s.rest.what; }),
-    row("shaker.platform_rms_g", "g", [](auto& s) { return rms_of(s.rest.witnesses.platform); }),
-    row("shaker.table_rms_g", "g", [](auto& s) { return rms_of(s.rest.witnesses.table); }),
+    row("shaker.platform_rms_g", "g", [](auto& s) { return s.rest.witnesses.platform.rms(); }),
+    row("shaker.table_rms_g", "g", [](auto& s) { return s.rest.witnesses.table.rms(); }),
     row("shaker.platform_witness_g", "g",
         [](auto& s) { return only(s.witness_g[0] >= 0, s.witness_g[0]); }),
     row("shaker.table_witness_g", "g",
@@ -282,14 +283,11 @@ const auto kValues = std::to_array<StatusValue>({
 
     row("", "", [](auto& s) { return !platform_good(s); })
         .gauge("vibrig_platform_silent", "1 while it has sent nothing within its deadline."),
-    row("", "", [](auto& s) { return s.platform.time != 0 && s.platform.ready; })
-        .mqtt("Platform/Ready"),
-    row("", "degC", [](auto& s) { return only(s.platform.time != 0, s.platform.temperature_c); })
-        .mqtt("Platform/Temperature"),
     row("platform.quality", "", [](auto& s) { return name_of(s.platform_state()); }),
     row("platform.time_s", "s",
         [](auto& s) { return only(s.platform.time != 0, drivers::to_seconds(s.platform.time)); }),
     row("platform.ready", "", [](auto& s) { return only(platform_good(s), s.platform.ready); })
+        .mqtt("Platform/Ready")
         .gauge("vibrig_platform_ready", "1 while the platform reports it.")
         .shown("platform", "ready", "NOT READY").off_page(),
     row("platform.loop_closed", "",
@@ -304,18 +302,19 @@ const auto kValues = std::to_array<StatusValue>({
         .shown("platform", "FAULT").off_page(),
     row("platform.temperature_c", "degC",
         [](auto& s) { return only(platform_good(s), s.platform.temperature_c); })
+        .mqtt("Platform/Temperature")
         .gauge("vibrig_platform_temperature_celsius", "As the platform reports.")
         .shown("platform", "{}", "").with_decimals(2).off_page(),
     row("platform.gimbal_time_s", "s", [](auto& s) {
         return only(s.platform.gimbal_time != 0, drivers::to_seconds(s.platform.gimbal_time)); }),
     row("platform.in_position", "",
-        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.in_position); })
+        [](auto& s) { return only(gimbals_good(s), s.platform.in_position); })
         .shown("platform", "in position").off_page(),
     row("platform.slewing", "",
-        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.slewing); })
+        [](auto& s) { return only(gimbals_good(s), s.platform.slewing); })
         .shown("platform", "slewing").off_page(),
     row("platform.gimbal_command_echo", "", [](auto& s) {
-        return only(s.platform.gimbal_time != 0, s.platform.gimbal_command_echo); }),
+        return only(gimbals_good(s), s.platform.gimbal_command_echo); }),
 
     row("journal.path", "", [](auto& s) { return s.journal.path; }),
     row("journal.running", "", [](auto& s) { return s.journal.running; }),
@@ -351,18 +350,18 @@ const auto kValues = std::to_array<StatusValue>({
     row("recorder.frames_dropped", "", [](auto& s) { return s.recorder.frames_dropped; }),
     row("recorder.entries_dropped", "", [](auto& s) { return s.recorder.entries_dropped; }),
 
-    row("estimate.amplitude_g", "g", [](auto& s) { return s.estimate.amplitude_g; })
+    row("estimate.amplitude_g", "g", [](auto& s) { return only(filters(s), s.estimate.amplitude_g); })
         .shown("vibration", "newest dwell {}").with_decimals(4),
-    row("estimate.frequency_hz", "Hz", [](auto& s) { return s.estimate.frequency_hz; })
+    row("estimate.frequency_hz", "Hz", [](auto& s) { return only(filters(s), s.estimate.frequency_hz); })
         .shown("vibration", "{}").with_decimals(3).unless("vibration.words"),
-    row("estimate.kappa", "", [](auto& s) { return s.estimate.kappa; }),
+    row("estimate.kappa", "", [](auto& s) { return only(filters(s), s.estimate.kappa); }),
     row("estimate.samples", "", [](auto& s) { return s.estimate.samples; })
         .shown("filter", "{} samples").off_page(),
     row("estimate.used", "", [](auto& s) { return s.estimate.used; })
         .shown("filter", "{} used").off_page(),
     row("estimate.rejected", "", [](auto& s) { return s.estimate.rejected; })
         .shown("filter", "{} rejected").off_page(),
-    row("estimate.nis_per_dof", "", [](auto& s) { return s.estimate.nis_per_dof; })
+    row("estimate.nis_per_dof", "", [](auto& s) { return only(filters(s), s.estimate.nis_per_dof); })
         .mqtt("Filter/NIS per degree of freedom")
         .gauge("vibrig_filter_nis_ratio", "Normalised innovation squared per degree of freedom.")
         .shown("filter", "NIS {}").with_decimals(3).off_page(),

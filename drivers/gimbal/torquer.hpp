@@ -31,6 +31,8 @@ class Torquer {
     [[nodiscard]] std::uint8_t counter() const noexcept { return counter_; }
     /// Nothing but zero has been commanded since the last zero.
     [[nodiscard]] bool zero() const noexcept { return zero_; }
+    /// Somebody before this may have commanded what the platform still does.
+    void doubt() noexcept { zero_ = false; }
 
   private:
     const proto::Message* message_ = nullptr;

@@ -169,7 +169,7 @@ def check_injection(checks, rig, address):
     status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST", body)
     checks.equal(status, 400, "a command with control characters is refused")
     # What protobuf says of a name quotes it.
-    body = '{"kind":"abort","by":"x","\\n2026-01-01 faked \\u001b[31m":1}'
+    body = '{"kind":"start","by":"x","\\n2026-01-01 faked \\u001b[31m":1}'
     status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST", body)
     checks.equal(status, 400, "in a key, too")
     rig.wait_for(lambda s: rig.daemon.text().count("refused a command") >= 2, 10)

@@ -5,9 +5,11 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <iterator>
 #include <thread>
 
 #include "daemon/serve/render.hpp"
@@ -19,6 +21,7 @@ namespace vibrig::tool {
 namespace {
 
 constexpr const char* kWho = "vibrig: ";  // before what a daemon has refused, too
+constexpr int kLongestLine = 1000;        // columns; what to do stands at its end
 
 using Steady = std::chrono::steady_clock;
 
@@ -87,7 +90,11 @@ int show_status(const StatusOptions& options) {
     const v1::Status status = ask_status(client);
     const double wall_s = std::chrono::duration<double>(Steady::now() - began).count();
     const serve::Rates rates = serve::rates_between(before, status, wall_s);
-    const auto lines = serve::render_table(status, rates, width_of_output());
+    // Printed once it may go on in the next row of a terminal: what to do stands at a line's end.
+    auto lines = serve::render_summary(status, rates, kLongestLine);
+    lines.emplace_back();
+    std::ranges::copy(serve::render_coefficients(status, width_of_output()),
+                      std::back_inserter(lines));
     for (std::size_t i = 0; i < lines.size(); ++i)
         std::cout << painted(lines[i], i == 0, status.campaign().state()) << '\n';
     return 0;
@@ -110,7 +117,6 @@ void show_rows(std::ostream& out,
 /// was.
 void show_signed_record(std::ostream& out, serve::Client& client, const std::string& before) {
     constexpr auto kLook = std::chrono::milliseconds(100);
-    constexpr int kLongestLine = 1000;
     for (int queries = 0; queries < 30; ++queries) {
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
@@ -177,7 +183,6 @@ int self_test(const TestOptions& options) {
     if (options.json) {
         std::cout << reply.body << '\n';
     } else {
-        constexpr int kLongestLine = 1000;  // what to do stands at its end
         for (const v1::Readiness::Check& check : found.checks()) {
             std::cout << mark_of(check.passed())
                       << serve::clipped(check.name() + ": " + check.text(), kLongestLine) << '\n';
@@ -308,12 +313,19 @@ std::string problem_of(const serve::Reply& reply) {
 
 void add_socket(CLI::App& command, serve::Address& at) {
     at.socket = default_socket();
+    if (const char* const host = std::getenv("VIBRIG_HOST"); host != nullptr) at.host = host;
+    auto* const socket =
+        command
+            .add_option("--socket", at.socket,
+                        "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
+            ->capture_default_str();
+    // Who names a socket means the rig that is there, whatever is in the environment.
+    socket->each([&at](const std::string& /*path*/) { at.host.clear(); });
     command
-        .add_option("--socket", at.socket,
-                    "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
-        ->capture_default_str();
-    command.add_option("--host", at.host, "Another machine, HOST[:8443], over TLS")
-        ->envname("VIBRIG_HOST");
+        .add_option("--host", at.host,
+                    "Another machine, HOST[:8443], over TLS, instead of a socket; VIBRIG_HOST "
+                    "sets a default")
+        ->excludes(socket);
     command
         .add_option("--identity", at.identity,
                     "Who you are there: FOLDER/NAME of `vibrig pki init`")

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -51,24 +50,6 @@ std::string in_link(const std::string& text) {
             continue;
         }
         out += printed("%%%02X", byte);
-    }
-    return out;
-}
-
-/// Back; nothing: it is no such text.
-std::optional<std::string> out_of_link(std::string_view text) {
-    std::string out;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        if (text[i] != '%') {
-            out += text[i];
-            continue;
-        }
-        unsigned byte = 0;
-        const char* const end = text.data() + std::min(i + 3, text.size());
-        const auto [at, error] = std::from_chars(text.data() + i + 1, end, byte, 16);
-        if (error != std::errc{} || at != text.data() + i + 3) return {};
-        out += static_cast<char>(byte);
-        i += 2;
     }
     return out;
 }
@@ -247,7 +228,7 @@ serve::Document ArchivePages::file(const archive::Entry& entry, std::string_view
     for (const auto& there : fs::directory_iterator(folder)) {
         // Only what is in the folder, by its own name: a query is no path.
         const std::string own = there.path().filename().string();
-        if (in_link(own) != name || !there.is_regular_file()) continue;
+        if (own != name || !there.is_regular_file()) continue;
         if (there.file_size() > kLargestFile)
             return {413, "", own + " is too large for a browser: it is in " + folder.string()};
         return {200,
@@ -263,22 +244,21 @@ serve::Document ArchivePages::answer(std::string_view path, std::string_view que
     if (path == "/") return {200, "text/html; charset=utf-8", front(index)};
     const bool of_campaign = path == "/campaign" || path == "/file";
     if (of_campaign) {
-        const auto key = index.key_of(std::string(serve::query_value(query, "hash")));
+        const auto key = index.key_of(serve::query_value(query, "hash"));
         const auto entry = key ? index.campaign(*key) : std::nullopt;
         if (!entry) return {404, "", "no such campaign in the archive"};
         if (path == "/file") return file(*entry, serve::query_value(query, "name"));
         return {200, "text/html; charset=utf-8", campaign(index, *entry)};
     }
     if (path == "/unit" || path == "/chart" || path == "/api/v1/trend") {
-        const auto serial = out_of_link(serve::query_value(query, "serial"));
-        auto campaigns =
-            serial && !serial->empty() ? of_unit(index, *serial) : std::vector<archive::Entry>{};
+        const std::string serial = serve::query_value(query, "serial");
+        auto campaigns = serial.empty() ? std::vector<archive::Entry>{} : of_unit(index, serial);
         if (campaigns.empty()) return {404, "", "no such unit in the archive"};
         if (path == "/unit") return {200, "text/html; charset=utf-8", unit(campaigns)};
         const auto trend = unit_trend(std::move(campaigns));
         if (path == "/chart") return chart(trend, serve::query_value(query, "coefficient"));
         return {200, "application/json",
-                proto::json_text(trend_json(*serial, trend, archive::kShutdownAfterH))};
+                proto::json_text(trend_json(serial, trend, archive::kShutdownAfterH))};
     }
     return {404, "", "no such page"};
 }

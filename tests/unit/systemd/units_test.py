@@ -20,6 +20,32 @@ def output(*command):
     return run.returncode, run.stdout
 
 
+# Without one of them it goes on, and says at most that something is missing: real time, the operators' group at the
+# socket, the last place in the queue for processor and disk of what delivers to the archive.
+NEEDED = {"vibrigd.service": {"sched_setscheduler", "sched_setaffinity", "mlockall", "chown", "setpriority", "ioprio_set"},
+          "vibrig-guard.service": set()}
+
+
+def calls_of(name):
+    """Of a set of systemd's, or the call itself."""
+    if not name.startswith("@"):
+        return {name}
+    calls = set()
+    for line in output("systemd-analyze", "syscall-filter", name)[1].splitlines()[1:]:
+        if line.strip() and not line.strip().startswith("#"):
+            calls |= calls_of(line.strip())
+    return calls
+
+
+def permitted(unit):
+    """By its lines SystemCallFilter=, the first of which begins with nothing."""
+    calls = set()
+    for line in re.findall(r"^SystemCallFilter=(.*)$", unit, re.M):
+        named = set().union(*map(calls_of, line.removeprefix("~").split()))
+        calls = calls - named if line.startswith("~") else calls | named
+    return calls
+
+
 def main():
     unit, folder = (os.path.abspath(path) for path in sys.argv[1:3])
     if shutil.which("systemd-analyze") is None:
@@ -45,6 +71,9 @@ def main():
             failed.append(f"systemd-analyze security: expected {LARGEST_EXPOSURE} at most: {said[-400:]}")
         else:
             print(f"exposure {exposure[1]}")
+        refused = NEEDED[os.path.basename(unit)] - permitted(text)
+        if refused:
+            failed.append(f"{unit}: SystemCallFilter refuses {', '.join(sorted(refused))}")
         for line in ("Type=notify", "WatchdogSec=", "User=vibrig", "CapabilityBoundingSet=\n", "StartLimit",
                      "RestartPreventExitStatus=2", *(["RestartForceExitStatus=75"] if unit.endswith("vibrigd.service") else [])):
             if "\n" + line not in text:

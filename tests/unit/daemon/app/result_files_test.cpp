@@ -15,6 +15,7 @@
 namespace vibrig {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -79,7 +80,38 @@ TEST_F(ResultFilesTest, ThatCannotBeWrittenRaiseAnAlarm) {
     of.begin();
     EXPECT_THAT(alarms_, IsEmpty());
     of.write("text", true);
-    EXPECT_THAT(alarms_, ElementsAre(HasSubstr("cannot write ")));
+    EXPECT_THAT(alarms_, ElementsAre(AllOf(HasSubstr("cannot write "),
+                                           HasSubstr("result.json: No such file or directory"))));
+}
+
+/// As of a disk that was full at the campaign's end.
+TEST_F(ResultFilesTest, ComeOnceTheDiskTakesThem) {
+    const auto later = [](int s) {
+        return std::chrono::steady_clock::now() + std::chrono::seconds(s);
+    };
+    const std::filesystem::path link = folder_ / "result.json.new";
+    std::filesystem::create_symlink("/dev/full", link);
+    auto of = files();
+    of.write("tonight", true);
+    EXPECT_THAT(alarms_, ElementsAre(HasSubstr("No space left on device")));
+    EXPECT_THAT(names(), IsEmpty()) << "and nothing half done";
+    std::filesystem::create_symlink("/dev/full", link);
+    of.try_again(later(2));
+    EXPECT_THAT(names(), IsEmpty());
+    of.try_again(later(2));
+    EXPECT_THAT(names(), IsEmpty()) << "once a second";
+    of.try_again(later(4));
+    EXPECT_EQ(content("result.json"), "tonight");
+    EXPECT_EQ(alarms_.size(), 1U);
+    // It is written once, and not for the campaign that comes next.
+    std::filesystem::remove(folder_ / "result.json");
+    of.try_again(later(6));
+    EXPECT_THAT(names(), IsEmpty());
+    std::filesystem::create_symlink("/dev/full", link);
+    of.write("tonight", true);
+    of.begin();
+    of.try_again(later(8));
+    EXPECT_THAT(names(), IsEmpty());
 }
 
 TEST_F(ResultFilesTest, AreNoneWithoutAFolder) {

@@ -26,6 +26,7 @@ class Archived : public record::Parts {
     void record_it(drivers::Time first_sample) {
         std::filesystem::remove(folder_ / "campaign.h5");
         record::Head one = head(1);
+        one.simulated = simulated_;
         one.configuration = "unit.serial = \"0017\"\nvibration.frequency_hz = 25.0\n";
         result_ = R"({"verdict":{"word":"valid","sentence":"valid"},"nis":1.1,"parameters":[)"
                   R"({"name":"D_Fx","value":2.5,"sigma":0.1},)"
@@ -33,6 +34,7 @@ class Archived : public record::Parts {
                   R"({"name":"D_IIx","value":0.5,"sigma":0.1}],"covariance":[[0.01],[0,0.04]]})";
         write(one, first_sample, {1, 2}, 2);
     }
+    bool simulated_ = false;
     void add() const { static_cast<void>(deliver(folder_.string(), place(), "rig", {})); }
 };
 

@@ -25,11 +25,11 @@ using ::testing::IsEmpty;
 /// With the `vibrig` beside this program.
 class OutboxTest : public Archived {
   protected:
-    void start() {
+    void start(const Outbox::Unit& unit = {}) {
         configuration::ArchiveSettings settings;
         settings.folder = lab().string();
         settings.rig = "rig";
-        outbox_ = std::make_unique<Outbox>(settings, recordings_.string(), Outbox::Unit{},
+        outbox_ = std::make_unique<Outbox>(settings, recordings_.string(), unit,
                                            [this](Severity severity, const std::string& words) {
                                                const std::lock_guard lock(mutex_);
                                                if (severity == Severity::alarm)
@@ -97,6 +97,23 @@ TEST_F(OutboxTest, PutsAsideWhatTheArchiveRefuses) {
     EXPECT_EQ(status.refused, 0U);
     EXPECT_EQ(status.refused_note, "");
     EXPECT_THAT(alarms(), IsEmpty());
+}
+
+TEST_F(OutboxTest, TakesNoSimulatedCampaignsForTheHistoryOfARealUnit) {
+    const auto is_delivered = [](const ArchiveStatus& s) { return s.delivered == 1; };
+    // GIVEN a unit of which the archive has a campaign on a simulated rig alone
+    simulated_ = true;
+    record_it(0);
+    add();
+    for (const bool real : {false, true}) {
+        // WHEN it is run on a rig, which asks for its earlier campaigns before it delivers
+        start({"0017", "", !real, 0});
+        EXPECT_EQ(wait_for(is_delivered).delivered, 1U);
+        // THEN a simulated rig shows it, a real one does not
+        EXPECT_EQ(outbox_->history().empty(), real) << outbox_->history();
+        outbox_.reset();
+        fs::remove_all(recordings_ / ".outbox");
+    }
 }
 
 }  // namespace

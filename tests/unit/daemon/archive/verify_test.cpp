@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include "daemon/journal/database.hpp"
+#include "daemon/record/index.hpp"
 #include "tests/unit/daemon/archive/archived.hpp"
 
 namespace vibrig::archive {
@@ -15,6 +17,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 class Verify : public Archived {
@@ -55,6 +58,28 @@ TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
     differs("UPDATE campaign SET started_utc_ns = started_utc_ns + 1",
             "campaign.started_utc_ns of rig/test-1: found \"1700001000000000001\", expected "
             "\"1700001000000000000\"");
+}
+
+TEST_F(Verify, FindsNothingWrongWithARigsOwnRecordings) {
+    // GIVEN a rig's own index: the recorder's, which has no dwells.csv, and results noted by a list
+    std::ofstream(folder_ / "dwells.csv") << "run,position\n";
+    record::Index(recordings_.string(), [](const std::string&) {
+    }).note_file((folder_ / "campaign.h5").string());
+    const Place own{recordings_.string(), index_in(recordings_.string())};
+    {
+        Index index(own.index, Database::Mode::write);
+        read_results(index, own.folder, "rig",
+                     [](const std::string& words) { ADD_FAILURE() << words; }, {});
+    }
+    const auto words = [&own] {
+        std::string all;
+        for (const auto& one : verify(own, "", "", false, {}).findings) all += one.text + '\n';
+        return all;
+    };
+    EXPECT_EQ(words(), "");
+    // WHEN a file that it does not have is changed, THEN it is no longer what was listed
+    std::ofstream(folder_ / "dwells.csv") << "run,position,other\n";
+    EXPECT_THAT(words(), HasSubstr("result.hash of test-1"));
 }
 
 TEST_F(Verify, NamesACampaignThatCountsNowhereThoughNothingWentOnFromIt) {

@@ -114,6 +114,13 @@ struct StagesTest : testing::Test, drivers::CanPort {
 
     void begin() {
         for (int i = 0; campaign && i < 40; ++i) tick();  // the last one's shaker comes to rest
+        make();
+        for (int i = 0; campaign->stopping() && i < 40; ++i) tick();
+        ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
+        ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
+    }
+
+    void make() {
         settings.positions_deg = {{0, 0, 0}, {0, 0, 0}};
         settings.table_g = {9};
         settings.dwell_s = 10;
@@ -124,9 +131,6 @@ struct StagesTest : testing::Test, drivers::CanPort {
         rig_port.torquer = &torquer;
         rig_port.feed = feed.get();
         campaign = std::make_unique<Campaign>(settings, Ports{rig_port, dwell_port, log_port});
-        for (int i = 0; campaign->stopping() && i < 40; ++i) tick();
-        ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
-        ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
     }
 
     StatusData status() const {
@@ -308,6 +312,25 @@ TEST_F(StagesTest, TorquersTheWrongWayRoundCannotSettleAndNoDataAreTaken) {
         std::ranges::count_if(
             events, [](const auto& e) { return e.find("cannot settle") != std::string::npos; }),
         1);
+}
+
+/// Killed while it levelled: the platform goes on as it was commanded last, for ever.
+TEST_F(StagesTest, EndsTheTorqueOfADaemonThatDiedArmed) {
+    settings.levelling = true;
+    make();
+    torque = {60, 0, 0};
+    campaign->take_over_trip("the daemon ended while armed by Ada");
+    tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    // WHEN the platform did not hear it, it is said again
+    torque = {60, 0, 0};
+    for (int i = 0; i < 10; ++i) tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    // THEN not of a rig that nobody had armed: who torques it there is not this daemon
+    make();
+    torque = {60, 0, 0};
+    for (int i = 0; i < 10; ++i) tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{60, 0, 0}));
 }
 
 TEST_F(StagesTest, AbortsWithOneClearReasonWhenAStageCannotGoOn) {

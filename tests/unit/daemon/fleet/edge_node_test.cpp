@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 #include <random>
 #include <set>
 
@@ -94,6 +95,41 @@ TEST(EdgeNode, TakesNothingButARebirth) {
         spoilt.resize(random() % (spoilt.size() + 1));
         (void)EdgeNode::asks_for_birth(spoilt);
     }
+}
+
+/// By name, as born; the type stays what it is where the value is null.
+std::map<std::string, sparkplug::Payload::Metric> born(const StatusData& status) {
+    EdgeNode node;
+    std::map<std::string, sparkplug::Payload::Metric> metrics;
+    const auto birth = parsed(node.birth(status));
+    for (const auto& metric : birth.metrics()) metrics[metric.name()] = metric;
+    return metrics;
+}
+
+TEST(EdgeNode, SaysNothingOfWhatIsNotKnown) {
+    constexpr std::uint32_t kBoolean = 11, kDouble = 10;
+    // GIVEN a shaker that is not read, with its emergency stop open when it was
+    StatusData status = serve::full_status();
+    auto well = born(status);
+    EXPECT_TRUE(well["Shaker/Emergency stop open"].boolean_value());
+    status.shaker.valid = false;
+    auto blind = born(status);
+    // THEN nobody is told that the chain is closed, or that nothing runs
+    for (const char* name : {"Shaker/Emergency stop open", "Shaker/Running"}) {
+        EXPECT_TRUE(blind[name].is_null()) << name;
+        EXPECT_FALSE(blind[name].has_boolean_value()) << name;
+        EXPECT_EQ(blind[name].datatype(), kBoolean) << name;
+    }
+    // GIVEN a platform that was ready and has said nothing for ten seconds
+    status = serve::full_status();
+    status.platform.ready = true;
+    EXPECT_TRUE(born(status)["Platform/Ready"].boolean_value());
+    status.time += 10 * drivers::kSecond;
+    auto silent = born(status);
+    // THEN it is not said to be ready, nor to have the temperature of then
+    EXPECT_TRUE(silent["Platform/Ready"].is_null());
+    EXPECT_TRUE(silent["Platform/Temperature"].is_null());
+    EXPECT_EQ(silent["Platform/Temperature"].datatype(), kDouble);
 }
 
 TEST(EdgeNode, MendsTextThatIsNotUtf8) {

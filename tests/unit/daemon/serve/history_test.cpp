@@ -110,6 +110,16 @@ TEST(History, LeavesOutWhatIsNotKnown) {
     EXPECT_EQ(answer["channels"][0]["mean"][0], 5.0);
     EXPECT_TRUE(answer["channels"][0]["mean"][1].is_null());
     EXPECT_TRUE(Json::parse(history.json("innovation_x_arcsec", 0))["time_s"].empty());
+    // A platform that has fallen silent keeps no temperature.
+    status = at(2, 0);
+    status.platform.time = status.time;
+    status.platform.temperature_c = 31.25;
+    history.add(status);
+    status.time += 10 * drivers::kSecond;
+    history.add(status);
+    const Json warm = Json::parse(history.json("temperature_c", 0));
+    ASSERT_EQ(warm["time_s"].size(), 1u);
+    EXPECT_EQ(warm["channels"][0]["mean"][0], 31.25);
 }
 
 TEST(History, RefusesWhatItDoesNotHave) {

@@ -33,6 +33,16 @@ TEST(Metrics, CarryWhatIsValidAndAddUp) {
     EXPECT_FALSE(holds(text, "nan") || holds(text, "Nan")) << text;
     status.shaker.valid = false;
     EXPECT_FALSE(holds(metrics_text(status, {}), "vibrig_shaker_measured"));
+    // An accelerometer of which nothing is known is not still, a filter without samples not right.
+    status.rest.witnesses.platform = {rt::RestVerdict::moving, 1.0};
+    status.rest.witnesses.table = {rt::RestVerdict::unknown, 0};
+    status.estimate = {};
+    const std::string unknown = metrics_text(status, {});
+    EXPECT_TRUE(
+        holds(unknown, "vibrig_rest_rms_meters_per_second_squared{body=\"platform\"} 9.80"));
+    EXPECT_FALSE(holds(unknown, "vibrig_rest_rms_meters_per_second_squared{body=\"table\"}"));
+    EXPECT_FALSE(holds(unknown, "vibrig_filter_nis_ratio"));
+    EXPECT_FALSE(holds(unknown, "vibrig_innovation_radians"));
 }
 
 }  // namespace

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "daemon/serve/metrics.hpp"
+#include "daemon/serve/render.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 
@@ -42,6 +45,7 @@ TEST(Readiness, NamesWhatIsNotWell) {
                 [](StatusData& s) {
                     s.rest = {"stop not obeyed", {}, true, ""};
                 }},
+            Row{"rest: unknown", [](StatusData& s) { s.rest = {}; }},
             Row{"annunciator: pager: /p: Permission denied",
                 [](StatusData& s) {
                     s.annunciator.command = true;
@@ -121,6 +125,12 @@ TEST(Silence, IsTheSameInStatusMetricsAndSelftest) {
     }
     EXPECT_EQ(status.platform_state(), ChannelState::silent);
     EXPECT_FALSE(message_of(status).platform().has_ready());
+    EXPECT_FALSE(message_of(status).platform().has_in_position());
+    EXPECT_FALSE(message_of(status).platform().has_slewing());
+    const Lines lines = render_summary(message_of(status), {}, 200);
+    EXPECT_TRUE(std::ranges::any_of(lines, [](const std::string& line) {
+        return line == "platform   SILENT  SIMULATED";
+    })) << "what it said before it fell silent is not said of now";
     const auto metrics = metrics_text(status, {});
     EXPECT_TRUE(holds(metrics, "vibrig_channel_quality{channel=\"outer\",quality=\"silent\"} 1\n"));
     EXPECT_TRUE(holds(metrics, "vibrig_channel_quality{channel=\"outer\",quality=\"good\"} 0\n"));

@@ -30,6 +30,26 @@ TEST(Command, IsReadWithAllItsFields) {
     EXPECT_EQ(parse_command(R"({"kind":"abort","by":"Ada"})").kind, CommandRequest::Kind::abort);
 }
 
+/// As `vibrig abort` takes any name: the table shakes while somebody reads an error.
+TEST(Command, AStopIsTakenWhateverIsBesideIt) {
+    for (const std::string& json :
+         {std::string(R"({"kind":"abort"})"), std::string(R"({"kind":"abort","by":"  "})"),
+          std::string(R"({"kind":"abort","by":"A\nfaked line"})"),
+          std::string(R"({"kind":"abort","by":"A","why":{"smoke":true}})"),
+          R"({"kind":"abort","by":")" + std::string(3000, 'x') + "\"}",
+          R"({"kind":"abort","by":"A","argument":")" + std::string(3000, 'x') + "\"}"}) {
+        const CommandRequest request = parse_command(json);
+        EXPECT_EQ(request.kind, CommandRequest::Kind::abort) << json;
+        EXPECT_FALSE(request.by.empty()) << json;
+        EXPECT_LT(request.by.size() + request.argument.size(), 310U) << json;
+        EXPECT_EQ(request.by.find('\n'), std::string::npos) << json;
+    }
+    EXPECT_EQ(parse_command(R"({"kind":"abort"})").by, "somebody");
+    // What is no command is no stop either, and which of two it is nobody knows.
+    EXPECT_NE(error_of(R"({"kind":"abort","by":3})"), "none");
+    EXPECT_NE(error_of(R"({"kind":"start","by":"A","why":"x"})").find("why"), std::string::npos);
+}
+
 TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
     EXPECT_NE(error_of(""), "none");
     EXPECT_NE(error_of("not json").find("not a Command in JSON"), std::string::npos);

@@ -204,6 +204,11 @@ TEST(StatusJson, LeavesOutWhatIsNotValid) {
     EXPECT_FALSE(status.estimate().parameters(5).has_sigma());
     EXPECT_FALSE(status.estimate().has_nis_per_dof());
     EXPECT_FALSE(status.campaign().dwells(0).has_kappa());
+    // Before the first sample of a campaign the filter's zeros are no measurement.
+    data.estimate = {};
+    const auto none = parsed<v1::Status>(status_json(data)).estimate();
+    EXPECT_FALSE(none.has_nis_per_dof() || none.has_amplitude_g() || none.has_frequency_hz() ||
+                 none.has_kappa() || none.innovation().has_x_arcsec());
 }
 
 TEST(StatusJson, WritesNullWhereTheCovarianceIsNotDetermined) {

@@ -145,6 +145,20 @@ TEST_F(TcpDoor, SaysOnceWhoStandsInItAndComesBackAfterThem) {
     EXPECT_TRUE(logged("takes connections again"));
 }
 
+/// At boot, before the network: a daemon that gave up then would measure nothing for the night.
+TEST_F(TcpDoor, WaitsForAnAddressThatTheMachineDoesNotHaveYet) {
+    server.reset();
+    settings.remote = "192.0.2.1:0";  // of nobody: RFC 5737
+    server = std::make_unique<StatusServer>(source, settings);
+    server->answer();
+    EXPECT_TRUE(before_long([&] { return !door("remote").open; }));
+    EXPECT_TRUE(logged("alarm: remote door https://192.0.2.1:"));
+    EXPECT_TRUE(door("page").open);
+    // The page is for this machine alone: its address is there.
+    settings.page = "127.0.0.1:nothing";
+    EXPECT_THROW(StatusServer(source, settings), ServeError);
+}
+
 TEST_F(TcpDoor, StaysAsItIsWhileNothingIsWrong) {
     std::this_thread::sleep_for(3500ms);
     EXPECT_EQ(source.logged(), "");

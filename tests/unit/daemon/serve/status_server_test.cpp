@@ -89,6 +89,21 @@ TEST_F(Server, RefusesUnknownKeysOfAQuery) {
     EXPECT_EQ(command("abort"), 200);
 }
 
+/// As clients write them that are made from the description, and requests and URLSearchParams.
+TEST_F(Server, TakesEscapesInAQuery) {
+    Client client(path);
+    const Reply both = client.get("/api/v1/history?channel=measured_g%2Ccommand_g&from=%30");
+    EXPECT_EQ(both.status, 200) << both.body;
+    EXPECT_EQ(nlohmann::json::parse(both.body)["channels"].size(), 2u);
+    EXPECT_EQ(client.get("/api/v1/events?%61fter=3").status, 200);
+    EXPECT_THAT(client.get("/api/v1/events?a%00b=3").body, HasSubstr("found 'a?b', expected"));
+    for (const char* bad : {"%", "%2", "%zz", "%+1", "%-1", "after=%", "after=1%2"}) {
+        const Reply reply = client.get(std::string("/api/v1/events?") + bad);
+        EXPECT_EQ(reply.status, 400) << bad;
+        EXPECT_THAT(reply.body, HasSubstr("expected % and two hexadecimal digits")) << bad;
+    }
+}
+
 TEST_F(Server, TakesTheKeysThatItsDescriptionHas) {
     Client client(path);
     const auto paths = nlohmann::json::parse(openapi_json())["paths"];

@@ -5,6 +5,7 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -77,6 +78,26 @@ TEST_F(Tool, PrintsTheStatusAsTheServerSaysIt) {
     EXPECT_NE(table.output.find("RECORDING  run 1/2, position 3/14"), std::string::npos)
         << table.output;
     EXPECT_EQ(table.output.find('\x1b'), std::string::npos) << "no colours into a pipe";
+    // Which keys would explain a pause, and what acknowledges a trip, stands at the end.
+    StatusData status = source.status();
+    status.reason = std::string(300, 'r') + ": the last word";
+    show(status);
+    EXPECT_NE(vibrig("status" + at).output.find("r: the last word"), std::string::npos);
+}
+
+/// One who has exported VIBRIG_HOST for a day's work would stop, or arm, another rig.
+TEST_F(Tool, AsksTheRigWhoseSocketIsNamedWhateverTheEnvironmentSays) {
+    const StatusServer server(source, path);
+    ::setenv("VIBRIG_HOST", "another-rig.invalid", 1);
+    const Outcome named = vibrig("abort --by Ada" + at);
+    const Outcome unnamed = vibrig("status");
+    const Outcome both = vibrig("status --host another-rig.invalid" + at);
+    ::unsetenv("VIBRIG_HOST");
+    EXPECT_EQ(named.code, 0) << named.output;
+    EXPECT_EQ(source.requests().size(), 1U);
+    EXPECT_NE(unnamed.output.find("--host needs --identity"), std::string::npos) << unnamed.output;
+    EXPECT_EQ(both.code, 2);
+    EXPECT_NE(both.output.find("--socket excludes --host"), std::string::npos) << both.output;
 }
 
 TEST_F(Tool, SaysWhenNoDaemonRuns) {
