@@ -10,4 +10,10 @@ namespace vibrig::proto {
     return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
 }
 
+/// NaN where it is none.
+template <class Json>
+[[nodiscard]] double number_or_nan(const Json& value) {
+    return value.is_number() ? value.template get<double>() : std::nan("");
+}
+
 }  // namespace vibrig::proto

@@ -12,4 +12,11 @@ template <class Json>
     return of.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
+/// What the object has at the key; empty: no text.
+template <class Json>
+[[nodiscard]] std::string text_at(const Json& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_string() ? found->template get<std::string>() : "";
+}
+
 }  // namespace vibrig::proto

@@ -9,6 +9,7 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/results/text_line.hpp"
 #include "estimator/filter/angles.hpp"
+#include "estimator/filter/median.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -31,11 +32,7 @@ std::vector<double> on_grid(const ColumnFile& file, const std::string& name, dou
         }
         steps.push_back(t[i] - t[i - 1]);
     }
-    if (tau0 <= 0 && !steps.empty()) {
-        const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-        std::nth_element(steps.begin(), middle, steps.end());
-        tau0 = *middle;
-    }
+    if (tau0 <= 0 && !steps.empty()) tau0 = estimator::median(steps);
     std::vector<double> values;
     double worst = 0;
     std::size_t where = 0;

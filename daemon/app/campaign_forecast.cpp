@@ -63,12 +63,10 @@ PlanData plan_data(const configuration::Configuration& c) {
     plan.dwell_s = campaign.dwell_s;
     plan.frequency_hz = campaign.frequency_hz;
     if (campaign.adaptive) {
-        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
-            const std::string unit = estimator::parameter_unit(i);
-            plan.target[i] = unit == "deg/h"     ? campaign.target_bias
-                             : unit == "deg/h/g" ? campaign.target_linear
-                                                 : campaign.target_quadratic;
-        }
+        const std::array by_order{campaign.target_bias, campaign.target_linear,
+                                  campaign.target_quadratic};
+        for (std::size_t i = 0; i < estimator::kParameters; ++i)
+            plan.target[i] = by_order[estimator::order_of(i)];
         return plan;
     }
     int run = 1;

@@ -7,6 +7,7 @@
 
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/commission/bus_bits.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig {
 
@@ -67,10 +68,7 @@ commission::Stated stated(const Parts& parts) {
 
 CommandReply Commissioning::command(const CommandRequest& request, const std::string& word,
                                     const Json& what, Time now) {
-    const auto text = [&what](const char* key) {
-        return what.contains(key) && what[key].is_string() ? what[key].get<std::string>()
-                                                           : std::string();
-    };
+    const auto text = [&what](const char* key) { return proto::text_at(what, key); };
     if (word == "begin") {
         if (active()) return {false, "the rig is being commissioned by " + procedure_->by()};
         return begin(request, what, now);
@@ -133,7 +131,7 @@ CommandReply Commissioning::begin(const CommandRequest& request, const Json& wha
 }
 
 void Commissioning::attend(const std::string& by) {
-    if (procedure_) procedure_->attend(by, rt::steady_now());
+    if (procedure_) procedure_->attend(by, drivers::steady_now());
 }
 
 Time Commissioning::step(Time now) {
@@ -145,7 +143,7 @@ Time Commissioning::step(Time now) {
         return drivers::kNever;
     }
     rig_.take_increments();
-    const Time next = procedure_->step(now, rt::steady_now());
+    const Time next = procedure_->step(now, drivers::steady_now());
     if (!procedure_->active()) end(now);
     return next;
 }

@@ -29,18 +29,18 @@ void ControlLoop::take_attendance(CommandRequest& request) {
     if (arming_ || campaign_.checking()) return;
     attendance_.reset();
     if (!attended) return;
-    attendance_ = Attendance{request.by, rt::steady_now()};
+    attendance_ = Attendance{request.by, drivers::steady_now()};
 }
 
 void ControlLoop::watch_attendance(Time now) {
     if (!attendance_) return;
     if (arming_) {  // it is being written to disk, and its tool waits for that
-        attendance_->steady = rt::steady_now();
+        attendance_->steady = drivers::steady_now();
         return;
     }
     if (!campaign_.checking()) return attendance_.reset();
     constexpr Time kAbsent = commission::Procedure::kAbsent;
-    if (rt::steady_now() - attendance_->steady <= kAbsent) return;
+    if (drivers::steady_now() - attendance_->steady <= kAbsent) return;
     const std::string by = attendance_->by;
     attendance_.reset();
     static_cast<void>(campaign_.command(

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/app/control_loop.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig {
 
@@ -22,10 +23,7 @@ struct Issued {
 Issued issued_of(const std::string& argument) {
     const auto what = nlohmann::json::parse(argument, nullptr, false);
     if (!what.is_object()) return {{}, "certificate: found no JSON object"};
-    const auto text = [&what](const char* key) {
-        return what.contains(key) && what[key].is_string() ? what[key].get<std::string>()
-                                                           : std::string();
-    };
+    const auto text = [&what](const char* key) { return proto::text_at(what, key); };
     Issued issued{text("number"), {}};
     if (issued.number.empty() || issued.number.size() > kLongestNumber)
         issued.wrong = fmt::format("certificate: number: expected 1 to {} bytes", kLongestNumber);
@@ -63,14 +61,15 @@ void ControlLoop::begin_certificate(WaitingCommand waiting) {
     numbers.push_back(issued.number);
     log(Severity::info, "certificate",
         fmt::format("{} issued by {}", issued.number, waiting.request.by));
-    certifying_.push_back({std::move(waiting), reply, entry, rt::steady_now()});
+    certifying_.push_back({std::move(waiting), reply, entry, drivers::steady_now()});
 }
 
 /// The PDF is given away once its hash is on disk.
 void ControlLoop::finish_certificates(bool at_once) {
     std::erase_if(certifying_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
-            if (!at_once && rt::steady_now() - one.since_steady < kJournalPatience) return false;
+            if (!at_once && drivers::steady_now() - one.since_steady < kJournalPatience)
+                return false;
             one.reply = {false, "the journal has not written it yet: the number is used up"};
         }
         reply_later(one.waiting, std::move(one.reply));

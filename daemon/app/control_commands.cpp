@@ -52,7 +52,7 @@ void ControlLoop::take_commands(Time now) {
                 answer(waiting, reply);
             else
                 acknowledging_.push_back({std::move(waiting), std::move(reply),
-                                          entry_of_acknowledgement_, rt::steady_now()});
+                                          entry_of_acknowledgement_, drivers::steady_now()});
         } else {
             const auto unfit = not_fit_to_shake(waiting.request);
             answer(waiting, unfit.empty() ? campaign_.command(waiting.request, now)
@@ -154,13 +154,13 @@ void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
         return answer(waiting, reply);
     }
     const auto entry = journal_->armed(waiting.request.by, campaign_.arming_text(waiting.request));
-    arming_.emplace(Arming{std::move(waiting), entry, rt::steady_now()});
+    arming_.emplace(Arming{std::move(waiting), entry, drivers::steady_now()});
 }
 
 void ControlLoop::finish_arming(Time now) {
     if (!arming_) return;
     if (!journal_->on_disk(arming_->entry)) {
-        if (rt::steady_now() - arming_->since_steady < kDiskPatience) return;
+        if (drivers::steady_now() - arming_->since_steady < kDiskPatience) return;
         const auto status = journal_->status();
         return give_up_arming(
             fmt::format("the journal has not written the arming within {:g} s: {}",
@@ -194,7 +194,7 @@ void ControlLoop::give_up_arming(const std::string& why) {
 void ControlLoop::finish_acknowledging(bool at_once) {
     std::erase_if(acknowledging_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
-            if (!at_once && rt::steady_now() - one.since_steady < kDiskPatience) return false;
+            if (!at_once && drivers::steady_now() - one.since_steady < kDiskPatience) return false;
             one.reply.message +=
                 "; the journal has not written it yet: after a restart it may have to be said "
                 "again";

@@ -16,7 +16,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const std::string word = what["do"];
     if (word == "attend") {
         if (attendance_ && journal::same_person(request.by, attendance_->by))
-            attendance_->steady = rt::steady_now();
+            attendance_->steady = drivers::steady_now();
         return reply_later(waiting, {true, "there"});
     }
     CommandReply reply;

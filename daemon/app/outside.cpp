@@ -77,7 +77,8 @@ void Outside::watch(bool tripped, bool alarm) {
     auto cause = proto::GuardCause::none;
     if (guard_link_) {
         const auto guard = guard_link_->status();
-        const auto lacked = std::exchange(guard_lacks_, guard_eyes_.lacks(guard, rt::steady_now()));
+        const auto lacked =
+            std::exchange(guard_lacks_, guard_eyes_.lacks(guard, drivers::steady_now()));
         if (guard.heard && lacked != guard_lacks_ && (guard_was_heard_ || !guard_lacks_.empty()))
             events_.log(guard_lacks_.empty() ? Severity::info : Severity::warning, "guard",
                         guard_lacks_.empty() ? "sees, and reaches the shaker" : guard_lacks_);

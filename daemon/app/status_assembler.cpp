@@ -63,7 +63,7 @@ StatusData StatusAssembler::status() const {
     status.channel_deadline_s = drivers::to_seconds(parts_.configuration.assembler.stale_deadline);
     status.platform_deadline_s = drivers::to_seconds(parts_.configuration.gimbal.status_deadline);
     status.silent = parts_.rig_clock && acquired.last_frames != 0 &&
-                    rt::steady_now() - acquired.last_frames > kSimulatedSilence;
+                    drivers::steady_now() - acquired.last_frames > kSimulatedSilence;
     status.sample_rate_hz = acquired.rate.hz();
     status.rate_misfit = parts_.fitness.rate_misfit();
     status.clock_misfit = parts_.fitness.clock_misfit();

@@ -83,7 +83,7 @@ std::string Supervisor::stuck_stage() {
     tell_clock_misfit();
     // In wall time. The simulated rig's clock may stand still, and with it all that waits on it.
     if (!parts_.in_real_time()) return {};
-    const Time wall = rt::steady_now();
+    const Time wall = drivers::steady_now();
     const auto acquired = acquisition_.view();
     const auto ring = estimator_stage_.ring();
     struct Stage {
@@ -169,7 +169,7 @@ void Supervisor::tell_watchdog() {
 void Supervisor::watch_onlookers() {
     const auto served = serving_steady_ns_.load();
     interlock_.onlookers(recorder_ && recorder_->degraded(),
-                         served != 0 && rt::steady_now() - served > kServerPatience);
+                         served != 0 && drivers::steady_now() - served > kServerPatience);
 }
 
 void Supervisor::tell_log() {

@@ -34,7 +34,7 @@ class Supervisor {
     /// The shaker's thread: everybody goes on, and nobody stops the table.
     [[nodiscard]] bool may_feed() const noexcept;
     /// The server's thread: it has taken a status.
-    void served() noexcept { serving_steady_ns_.store(rt::steady_now()); }
+    void served() noexcept { serving_steady_ns_.store(drivers::steady_now()); }
     /// Any thread: how far the control thread is.
     [[nodiscard]] std::uint64_t control_mark() const noexcept {
         return static_cast<std::uint64_t>(control_beat_.load());

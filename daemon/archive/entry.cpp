@@ -56,7 +56,7 @@ void take_coefficients(const Json& root, double frequency_hz, Entry& to) {
         if (!std::isfinite(of.u_a)) of.u_a = sigma;
         if (!std::isfinite(of.u)) of.u = of.u_a;
         if (!std::isfinite(of.expanded)) of.expanded = 2 * of.u;
-        if (is_quadratic(i)) of.at_hz = at_hz_of(root, one, frequency_hz);
+        if (estimator::is_quadratic(i)) of.at_hz = at_hz_of(root, one, frequency_hz);
         to.coefficients[i] = of;
     }
     const char* const which =

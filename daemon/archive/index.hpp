@@ -62,6 +62,7 @@ class Index {
 
   private:
     void put_rows(const Entry& entry);
+    void remove_rows(const std::string& key);
     void put_files(const Entry& entry);
     void take_coefficients(const Filter& filter, std::map<std::string, Entry*>& by_key);
 

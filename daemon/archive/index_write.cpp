@@ -21,9 +21,7 @@ void Index::put(const Entry& entry, bool files) {
     database_.guarded([&] {
         Change change(database_.sql());
         auto& sql = database_.sql();
-        for (const char* table :
-             {"result", "coefficient", "covariance", "noise", "instrument", "temperature"})
-            sql << fmt::format("DELETE FROM {} WHERE campaign = :key", table), use(entry.key);
+        remove_rows(entry.key);
         if (files) put_files(entry);
         put_rows(entry);
         // It has gone on since: what ended earlier is part of what ended last, whichever was
@@ -36,6 +34,12 @@ void Index::put(const Entry& entry, bool files) {
             use(entry.rig, "rig2"), use(entry.name, "name2"), use(entry.started_utc_ns, "started2");
         change.commit();
     });
+}
+
+void Index::remove_rows(const std::string& key) {
+    for (const char* table :
+         {"result", "coefficient", "covariance", "noise", "instrument", "temperature"})
+        database_.sql() << fmt::format("DELETE FROM {} WHERE campaign = :key", table), use(key);
 }
 
 void Index::put_files(const Entry& entry) {
@@ -140,9 +144,8 @@ void Index::forget(const std::string& key) {
     database_.guarded([&] {
         Change change(database_.sql());
         auto& sql = database_.sql();
-        for (const char* table :
-             {"result", "coefficient", "covariance", "noise", "instrument", "temperature", "file"})
-            sql << fmt::format("DELETE FROM {} WHERE campaign = :key", table), use(key);
+        remove_rows(key);
+        sql << "DELETE FROM file WHERE campaign = :key", use(key);
         sql << "DELETE FROM campaign WHERE key = :key", use(key);
         change.commit();
     });

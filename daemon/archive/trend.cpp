@@ -163,7 +163,7 @@ CoefficientTrend points_of(std::size_t position, const Coefficients& like, Trend
         if (one->coefficients[position]) reference = &*one->coefficients[position];
     if (reference == nullptr) return of;
     of.at_hz = reference->at_hz;
-    if (is_quadratic(position)) trend.vibrations.insert(vibration_text(of.at_hz));
+    if (estimator::is_quadratic(position)) trend.vibrations.insert(vibration_text(of.at_hz));
     for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
         const auto& c = trend.campaigns[i].coefficients[position];
         // What one rig has wrong it has wrong each time: between its campaigns only noise

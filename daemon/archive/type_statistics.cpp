@@ -64,7 +64,7 @@ TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& wi
         const Coefficients& of = asked ? like : kept.back()->coefficients;
         out.vibration = vibrations_in(of);
         out.of_other_vibration = std::erase_if(
-            kept, [&of](const Entry* one) { return !same_vibration(of, one->coefficients); });
+            kept, [&of](const Entry* one) { return !same_vibration(one->coefficients, of); });
     }
     const bool several_rigs =
         std::ranges::any_of(kept, [&](const Entry* one) { return one->rig != kept.front()->rig; });

@@ -3,26 +3,23 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <set>
-#include <string_view>
 
 namespace vibrig::archive {
 
 namespace fs = std::filesystem;
+using estimator::is_quadratic;
 
-bool is_quadratic(std::size_t position) {
-    return estimator::parameter_unit(position) == std::string_view("deg/h/g^2");
+bool same_vibration(const std::optional<double>& one, const std::optional<double>& reference) {
+    if (!one || !reference) return one.has_value() == reference.has_value();
+    return *one != kAtNoFrequency && estimator::same_vibration(*one, *reference);
 }
 
-bool same_vibration(const std::optional<double>& a, const std::optional<double>& b) {
-    return a && b ? std::abs(*a - *b) <= kSameVibration_hz : a.has_value() == b.has_value();
-}
-
-bool same_vibration(const Coefficients& a, const Coefficients& b) {
-    for (std::size_t i = 0; i < a.size(); ++i)
-        if (a[i] && b[i] && !same_vibration(a[i]->at_hz, b[i]->at_hz)) return false;
+bool same_vibration(const Coefficients& one, const Coefficients& reference) {
+    for (std::size_t i = 0; i < one.size(); ++i)
+        if (one[i] && reference[i] && !same_vibration(one[i]->at_hz, reference[i]->at_hz))
+            return false;
     return true;
 }
 
@@ -48,7 +45,7 @@ Coefficients all_at(const std::optional<double>& hz) {
 
 std::size_t count_of_other_vibrations(const Coefficients& of, const std::vector<Entry>& campaigns) {
     return static_cast<std::size_t>(std::ranges::count_if(
-        campaigns, [&of](const Entry& one) { return !same_vibration(of, one.coefficients); }));
+        campaigns, [&of](const Entry& one) { return !same_vibration(one.coefficients, of); }));
 }
 
 bool vibration_noted(const Coefficients& of) {

@@ -10,15 +10,14 @@
 
 namespace vibrig::archive {
 
-/// Frequencies that differ by less are one, Hz.
-inline constexpr double kSameVibration_hz = 0.01;
-
-/// Bias and linear coefficients are of any vibration; only these depend on it.
-[[nodiscard]] bool is_quadratic(std::size_t position);
-/// Whether two may be compared, by their at_hz: what is not noted is of a vibration of its own.
-[[nodiscard]] bool same_vibration(const std::optional<double>& a, const std::optional<double>& b);
+/// Whether one may be compared with the reference, by their at_hz: of the same vibration as
+/// estimator::same_vibration() has it. What is of no single frequency depends on the share that
+/// each had in its campaign, and is compared with none; what is not noted is of a vibration of its
+/// own.
+[[nodiscard]] bool same_vibration(const std::optional<double>& one,
+                                  const std::optional<double>& reference);
 /// Those that both determine.
-[[nodiscard]] bool same_vibration(const Coefficients& a, const Coefficients& b);
+[[nodiscard]] bool same_vibration(const Coefficients& one, const Coefficients& reference);
 /// "at 15 Hz", "static", "at no single frequency", "of a vibration that is not noted".
 [[nodiscard]] std::string vibration_text(const std::optional<double>& at_hz);
 /// Each of them once, with commas between; empty: there is no quadratic coefficient.

@@ -149,7 +149,7 @@ class Log {
     virtual void proved(const ProofRecord&) {}
     [[nodiscard]] virtual std::int64_t utc_ns() const { return 0; }
     /// CLOCK_MONOTONIC, whatever clock the rig has: an arming expires in people's time.
-    [[nodiscard]] virtual drivers::Time steady_now() const { return rt::steady_now(); }
+    [[nodiscard]] virtual drivers::Time steady_now() const { return drivers::steady_now(); }
 };
 
 struct Ports {

@@ -11,6 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "estimator/filter/median.hpp"
+
 namespace vibrig::campaign {
 
 namespace {
@@ -33,12 +35,6 @@ std::map<std::string, std::string> lines_of(const std::string& keys) {
 double value_of(const ProofRecord& record, std::string_view name) {
     const auto row = std::ranges::find(record.rows, name, &CheckRow::name);
     return row == record.rows.end() ? 0 : row->value;
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    return *middle;
 }
 
 // Stops that are timed in every proof.
@@ -235,9 +231,10 @@ std::string SafetyProof::trend() const {
         }
         const double now_s = value_of(newest, name);
         if (earlier.size() < kFewest || now_s <= 0) continue;
-        const double usual_s = median(earlier);
+        const double usual_s = estimator::median(earlier);
         for (const double time_s : earlier) distance.push_back(std::abs(time_s - usual_s));
-        if (now_s <= usual_s + std::max(kLeast_s, kDeviations * 1.4826 * median(distance)))
+        if (now_s <=
+            usual_s + std::max(kLeast_s, kDeviations * 1.4826 * estimator::median(distance)))
             continue;
         words += fmt::format("{}{} takes longer: {:.2f} s, {:.2f} s in the median of {} earlier",
                              words.empty() ? "" : "; ", name, now_s, usual_s, earlier.size());

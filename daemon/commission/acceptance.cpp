@@ -8,6 +8,7 @@
 
 #include "daemon/journal/latches.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::commission {
 
@@ -128,11 +129,8 @@ std::vector<SignStatement> sign_statements(const Json& json) {
     for (const Json& one : json) {
         SignStatement s;
         if (one.is_object()) {
-            const auto text = [&one](const char* key) {
-                return one.contains(key) && one[key].is_string() ? one[key].get<std::string>() : "";
-            };
-            s.by = text("by");
-            s.source = text("source");
+            s.by = proto::text_at(one, "by");
+            s.source = proto::text_at(one, "source");
             if (one.contains("says") && one["says"].is_number_integer()) s.says = one["says"];
         }
         all.push_back(std::move(s));

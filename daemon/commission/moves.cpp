@@ -85,10 +85,9 @@ void Procedure::move(const Vec3& travel, Then then) {
             doing_ = Doing::settling;
         };
         if (what.empty()) return still("");
-        return ask(
-            {"hand", "By hand, from the start, within 20 deg: " + what + "; hold still.", "done",
-             "done", [](std::string& v) { return v == "done" ? "" : "done, or an empty answer"; }},
-            still);
+        return ask({"hand", "By hand, from the start, within 20 deg: " + what + "; hold still.",
+                    "done", "done", done_alone},
+                   still);
     }
     legs_.clear();
     if (released_ && !replaying_) travel_ = read_travel(travel_);

@@ -177,13 +177,17 @@ std::string Procedure::wrong_name() const {
     return {};
 }
 
+std::array<double, 2> Procedure::readings_of(std::size_t slot) const {
+    const std::size_t c = channel_of_[slot];
+    const double a = start_[c] + ratio_[c] * limits_deg_[slot][0];
+    const double b = start_[c] + ratio_[c] * limits_deg_[slot][1];
+    return {std::min(a, b), std::max(a, b)};
+}
+
 void Procedure::separate() {
     std::array<std::array<double, 2>, 3> limits{};
     for (std::size_t k = 0; k < 3; ++k) {
-        const std::size_t c = channel_of_[k];
-        const double a = start_[c] + ratio_[c] * limits_deg_[k][0];
-        const double b = start_[c] + ratio_[c] * limits_deg_[k][1];
-        limits[c] = {std::min(a, b), std::max(a, b)};
+        limits[channel_of_[k]] = readings_of(k);
     }
     const auto found =
         room::separating_position(gravity_.hypotheses[0].best, gravity_.hypotheses[1].best, limits);
@@ -407,9 +411,7 @@ void Procedure::name_rig() {
     commanded.ratio = ratio_;
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t c = channel_of_[k];
-        const double a = start_[c] + ratio_[c] * limits_deg_[k][0];
-        const double b = start_[c] + ratio_[c] * limits_deg_[k][1];
-        commanded.travel[c] = {std::min(a, b), std::max(a, b)};
+        commanded.travel[c] = readings_of(k);
         commanded.slot[c] = k;
         commanded.free[c] = free_[k];
     }

@@ -73,13 +73,18 @@ void Procedure::ask(Question question, std::function<void(const std::string&)> t
     take_said(value);
 }
 
+std::string yes_or_no(std::string& answer) {
+    if (answer == "y") answer = "yes";
+    if (answer == "n") answer = "no";
+    return answer == "yes" || answer == "no" ? "" : "yes or no";
+}
+
+std::string done_alone(std::string& answer) {
+    return answer == "done" ? "" : "done, or an empty answer";
+}
+
 void Procedure::ask_yes(const std::string& id, const std::string& text, const std::string& no,
                         Then then, const std::string& usual) {
-    const auto yes_or_no = [](std::string& value) {
-        if (value == "y") value = "yes";
-        if (value == "n") value = "no";
-        return value == "yes" || value == "no" ? "" : "yes or no";
-    };
     ask({id, text, "yes or no", usual, yes_or_no},
         [this, no, then = std::move(then)](const std::string& value) {
             if (value == "yes") return then();

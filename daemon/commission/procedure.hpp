@@ -31,6 +31,10 @@ struct Question {
     std::function<std::string(std::string&)> wrong;
 };
 
+/// For Question::wrong; y and n become yes and no.
+[[nodiscard]] std::string yes_or_no(std::string& answer);
+[[nodiscard]] std::string done_alone(std::string& answer);
+
 /// Steps A to G (docs/commissioning.md): looks, moves one gimbal at a time, names the rig by
 /// gravity, the Earth's rate and torques. What moves is decided here: nothing moves without a
 /// permission, beyond the travel that was stated, or while nobody is there. Control thread only;
@@ -176,6 +180,8 @@ class Procedure {
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
     [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
     [[nodiscard]] std::size_t slot_of(std::size_t gimbal) const;
+    /// Least and most that its encoder reads within the limits of its travel, deg.
+    [[nodiscard]] std::array<double, 2> readings_of(std::size_t slot) const;
 
     // turns.cpp: G, of the gyros' increments
     void ask_turns();

@@ -182,11 +182,10 @@ void Procedure::try_gimbal() {
     const std::string name = kLoudNames[slot_];
     if (by_hand_) {
         before_ = mean_;
-        return ask(
-            {std::string("hand.") + kGimbalNames[slot_],
-             "Turn the " + name + " gimbal by about 9 deg by hand, and hold still.", "done", "done",
-             [](std::string& v) { return v == "done" ? "" : "done, or an empty answer"; }},
-            [this](const std::string&) { average(3, [this] { hand_moved(); }); });
+        return ask({std::string("hand.") + kGimbalNames[slot_],
+                    "Turn the " + name + " gimbal by about 9 deg by hand, and hold still.", "done",
+                    "done", done_alone},
+                   [this](const std::string&) { average(3, [this] { hand_moved(); }); });
     }
     ask_yes(std::string("permit.") + kGimbalNames[slot_],
             "I will move the " + name + " gimbal by a little; the direction is not known. May I?",

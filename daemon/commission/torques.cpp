@@ -34,11 +34,6 @@ std::string axes_of(const room::TorqueFinding& f) {
 void Procedure::ask_torques() {
     if (by_hand_ || !rig_->has_torquers()) return ask_turns();
     torque_deg_h_ = std::min(kTorque_deg_h, stated_.torque_limit_deg_h);
-    const auto yes_or_no = [](std::string& value) {
-        if (value == "y") value = "yes";
-        if (value == "n") value = "no";
-        return value == "yes" || value == "no" ? "" : "yes or no";
-    };
     ask({"permit.torque",
          fmt::format("I will let the platform go and torque it by {:g} deg/h, one axis after the "
                      "other, both ways: it turns by less than {:g} deg. May I?",

@@ -21,11 +21,6 @@ constexpr std::array<const char*, 3> kAxisNames{"x", "y", "z"};
 
 void Procedure::ask_turns() {
     if (by_hand_ || !rig_->has_increments()) return name_rig();
-    const auto yes_or_no = [](std::string& value) {
-        if (value == "y") value = "yes";
-        if (value == "n") value = "no";
-        return value == "yes" || value == "no" ? "" : "yes or no";
-    };
     ask({"permit.turns",
          fmt::format("I will turn each gimbal by {:g} deg while the gyros count. May I?",
                      kTurn_deg),

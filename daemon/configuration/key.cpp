@@ -9,6 +9,7 @@
 
 #include "daemon/configuration/problems.hpp"
 #include "daemon/configuration/value.hpp"
+#include "estimator/filter/settings_check.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::configuration {
@@ -100,12 +101,6 @@ std::string write_axis(const estimator::SignedAxis& axis) {
            '"';
 }
 
-double determinant(const Matrix& m) {
-    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
 /// The three elements of an array.
 template <class Read>
 auto read_three(const Entry& entry, const std::string& what, Read read) {
@@ -120,8 +115,8 @@ std::optional<Matrix> read_matrix(const Entry& entry) {
     auto value = read_three(entry, "rows of 3 numbers", [](const Entry& row) {
         return row.triple({kMatrix, kMatrix, kMatrix}, "");
     });
-    if (value && std::abs(determinant(*value)) < kSingular) {
-        entry.refuse("a matrix with determinant " + plain(determinant(*value)),
+    if (value && std::abs(estimator::determinant(*value)) < kSingular) {
+        entry.refuse("a matrix with determinant " + plain(estimator::determinant(*value)),
                      "one that can be inverted (determinant " + plain(kSingular) + " at least)");
         value.reset();
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/configuration/value.hpp"
+#include "daemon/plan/number_table.hpp"
 #include "estimator/spectrum/controller_psd.hpp"
 #include "estimator/spectrum/seen.hpp"
 
@@ -30,11 +31,6 @@ std::uint32_t checksum_of(const std::vector<std::pair<double, double>>& psd) {
     return crc.checksum();
 }
 
-[[noreturn]] void refuse(const std::string& place, const std::string& found,
-                         const std::string& expected) {
-    throw plan::PlanFileError(place + ": found " + found + ", expected " + expected);
-}
-
 const Named& profile_of(const Configuration& rig, const plan::PlannedRun& run,
                         const std::string& place) {
     std::string known;
@@ -44,8 +40,9 @@ const Named& profile_of(const Configuration& rig, const plan::PlannedRun& run,
             return one;
         known += (known.empty() ? "" : ", ") + one.profile.name;
     }
-    refuse(place, "'" + run.profile + "'",
-           "the name or number of a [[profile]]" + (known.empty() ? "" : ": one of " + known));
+    plan::refuse(
+        place, "'" + run.profile + "'",
+        "the name or number of a [[profile]]" + (known.empty() ? "" : ": one of " + known));
 }
 
 /// Of bands with a ratio each: their mean square becomes so many times as large.
@@ -132,15 +129,17 @@ campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run) {
     const Named& named = profile_of(rig, run, place);
     const std::string name = "'" + named.profile.name + "'";
     if (named.number == 0)
-        refuse(place, name + " without a number", "its number in the controller: profile.number");
-    if (!named.profile.sines.empty()) refuse(place, name + " with sines", "a psd alone");
+        plan::refuse(place, name + " without a number",
+                     "its number in the controller: profile.number");
+    if (!named.profile.sines.empty()) plan::refuse(place, name + " with sines", "a psd alone");
     if (std::abs(std::abs(named.profile.direction[1]) - 1) > 1e-6)
-        refuse(place, name + " across the vertical", "what a shaker under the platform plays");
+        plan::refuse(place, name + " across the vertical",
+                     "what a shaker under the platform plays");
     if (!named.at_table && !rig.spectrum.mount.hard)
-        refuse(place, name + " at the platform, behind isolators",
-               "at = \"table\": the controller's breakpoints, of which the checksum is");
+        plan::refuse(place, name + " at the platform, behind isolators",
+                     "at = \"table\": the controller's breakpoints, of which the checksum is");
     const auto found = played(rig, named);
-    if (!found) refuse(place, name, "a psd within spectrum.transmission");
+    if (!found) plan::refuse(place, name, "a psd within spectrum.transmission");
     const auto number = static_cast<std::uint16_t>(named.number);
     const double level = std::pow(10, run.level_db / 20);
     const double seen =

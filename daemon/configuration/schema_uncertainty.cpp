@@ -148,7 +148,9 @@ Key harmonics() {
         const auto* stated = table == nullptr ? nullptr : table->get_as<bool>("declared");
         if (order == nullptr || size == nullptr || table->size() != (stated == nullptr ? 2 : 3) ||
             order->get() < 1 || order->get() > 1000) {
-            entry.refuse(std::string(kHarmonic) + ", order from 1 to 1000");
+            const auto* number = table == nullptr ? nullptr : table->get("order");
+            (number == nullptr ? entry : entry.part(*number, "order"))
+                .refuse(std::string(kHarmonic) + ", order a whole number from 1 to 1000");
             return std::nullopt;
         }
         const auto arcsec = entry.part(*size, "arcsec").number({0, 3600}, "arcsec");
@@ -159,6 +161,13 @@ Key harmonics() {
     auto read = [read_one](const Entry& entry, C& c) {
         const auto list = entry.elements(0, 16, kHarmonic, read_one);
         if (!list) return;
+        for (std::size_t i = 0; i < list->size(); ++i) {
+            const int order = (*list)[i].first.order;
+            const auto same = [order](const auto& one) { return one.first.order == order; };
+            if (std::any_of(list->begin(), list->begin() + static_cast<std::ptrdiff_t>(i), same))
+                return entry.element(i).refuse("order " + std::to_string(order) + " once more",
+                                               "each order once");
+        }
         Inputs& inputs = c.estimator.uncertainty;
         inputs.resolver_harmonics.clear();
         // No harmonics is a statement, too.

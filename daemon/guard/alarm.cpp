@@ -63,12 +63,6 @@ int file_with(const std::string& text) noexcept {
 
 }  // namespace
 
-Time steady_now() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
-
 void say(const char* severity, const std::string& text) {
     pollfd out{STDERR_FILENO, POLLOUT, 0};
     if (::poll(&out, 1, 0) != 1 || (out.revents & POLLOUT) == 0) return;
@@ -288,12 +282,12 @@ void Alarm::run() {
         lock.unlock();
         // First: a horn that is not reached, or not even found, takes its time.
         if (stop_pager_) {
-            attend(Tune::stop, steady_now());
-            attend(Tune::disobeyed, steady_now());
+            attend(Tune::stop, drivers::steady_now());
+            attend(Tune::disobeyed, drivers::steady_now());
         }
-        if (coils_ && steady_now() >= due) {
-            sound(steady_now());
-            due = steady_now() + kBeat;
+        if (coils_ && drivers::steady_now() >= due) {
+            sound(drivers::steady_now());
+            due = drivers::steady_now() + kBeat;
         }
         lock.lock();
         const auto woken = [&] {
@@ -304,13 +298,14 @@ void Alarm::run() {
         if (paging())
             changed_.wait_for(lock, kLookAtPager, woken);
         else if (coils_)
-            changed_.wait_for(lock, std::chrono::nanoseconds(std::max<Time>(due - steady_now(), 1)),
-                              woken);
+            changed_.wait_for(
+                lock, std::chrono::nanoseconds(std::max<Time>(due - drivers::steady_now(), 1)),
+                woken);
         else
             changed_.wait(lock, woken);
     }
     // Nobody would end it; only a table that obeys no stop is left sounding.
-    if (coils_ && shown_ != Tune::disobeyed) (void)coils_->show(Tune::none, steady_now());
+    if (coils_ && shown_ != Tune::disobeyed) (void)coils_->show(Tune::none, drivers::steady_now());
 }
 
 }  // namespace vibrig::guard

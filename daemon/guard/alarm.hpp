@@ -122,9 +122,6 @@ class Alarm {
     std::thread thread_;
 };
 
-/// CLOCK_MONOTONIC.
-[[nodiscard]] drivers::Time steady_now() noexcept;
-
 /// One line on standard error, and none where it would have to wait for it.
 void say(const char* severity, const std::string& text);
 

@@ -48,7 +48,7 @@ void Guard::look_later() {
 }
 
 void Guard::look() {
-    const auto now = steady_now();
+    const auto now = drivers::steady_now();
     const bool asked = meeting_.attend(now);
     const auto shaker = shaker_.word(now);
     witnesses_.doubt(now, shaker.known ? shaker.measured_g : 0);
@@ -137,7 +137,7 @@ proto::GuardWord Guard::word(drivers::Time now) const {
 }
 
 std::string Guard::words() const {
-    const auto now = steady_now();
+    const auto now = drivers::steady_now();
     const auto shaker = shaker_.word(now);
     const auto of = [](bool there, const Motion& motion, bool stuck, bool frozen) {
         if (!there) return std::string("none");

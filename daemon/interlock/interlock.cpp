@@ -1,7 +1,6 @@
 #include "daemon/interlock/interlock.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -14,12 +13,6 @@ namespace vibrig::rt {
 
 using drivers::Channel;
 using drivers::Time;
-
-Time steady_now() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
 
 const char* text_of(Trip trip) noexcept { return condition_of(trip).text; }
 
@@ -328,7 +321,7 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
 }
 
 void Interlock::lost_bus() noexcept {
-    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, steady_now());
+    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, drivers::steady_now());
 }
 
 void Interlock::check(const drivers::ShakerReading& reading) noexcept {
@@ -381,7 +374,7 @@ void Interlock::uncommanded() noexcept {
 
 void Interlock::stop_written() noexcept {
     if (const Time asked = stop_asked_.exchange(0); asked != 0)
-        reactions_.add(steady_now() - asked);
+        reactions_.add(drivers::steady_now() - asked);
 }
 
 std::string Interlock::text_of(const Tripped& tripped) const {

@@ -37,8 +37,6 @@ struct alignas(8) Tripped {
 };
 static_assert(sizeof(Tripped) == 8 && std::atomic<Tripped>::is_always_lock_free);
 static_assert(kMostRules <= 256, "a row's number fits into a byte");
-/// CLOCK_MONOTONIC, whatever clock the rig has.
-[[nodiscard]] drivers::Time steady_now() noexcept;
 
 /// Software's share of a reaction: frames in to stop confirmed by the controller, wall time.
 class ReactionHistogram {
@@ -138,19 +136,19 @@ class Interlock {
     void lost_bus() noexcept;
     /// Control thread, which alone judges this one: its row is raised whatever tripped before.
     void stop_disobeyed(bool disobeyed) noexcept {
-        judge(By::read_back, Trip::stop_disobeyed, disobeyed, steady_now());
+        judge(By::read_back, Trip::stop_disobeyed, disobeyed, drivers::steady_now());
     }
     /// Control thread: the accelerometers see motion where nothing was asked for.
     void uncommanded() noexcept;
     /// Control thread, which alone judges this one: they see another vibration than was asked for.
     void wrong_vibration(bool wrong) noexcept {
-        judge(By::read_back, Trip::wrong_vibration, wrong, steady_now());
+        judge(By::read_back, Trip::wrong_vibration, wrong, drivers::steady_now());
     }
     /// Control thread, which alone judges these two: over what the loop check found, allowances
     /// in; both judged not wrong: none is looked for any more.
     void growth(double motion_in_step, double across) noexcept {
-        judge(By::read_back, Trip::motion_in_step, motion_in_step, steady_now());
-        judge(By::read_back, Trip::cross_growth, across, steady_now());
+        judge(By::read_back, Trip::motion_in_step, motion_in_step, drivers::steady_now());
+        judge(By::read_back, Trip::cross_growth, across, drivers::steady_now());
     }
     void no_growth() noexcept;
     /// Any thread. The first cause stays.

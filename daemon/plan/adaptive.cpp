@@ -20,11 +20,6 @@ constexpr std::size_t kFarthest = 60;
 // Targets come nearer by a fifth at a time, down to 1e-5 of them.
 constexpr int kNearest = 50;
 
-std::size_t kind_of(std::size_t parameter) {
-    const std::size_t group = estimator::kPublicGroup[parameter % estimator::kGroups];
-    return static_cast<std::size_t>(estimator::kCoefficientTable[group].order);
-}
-
 constexpr std::array<const char*, 3> kKinds{"bias", "linear", "quadratic"};
 
 }  // namespace
@@ -70,7 +65,7 @@ AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSe
     if (!all.identifies_all) throw std::runtime_error("adaptive campaign: " + all.refusal);
     const auto prior = estimator::prior_sigma(settings);
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
-        target_.push_back(adaptive.target[kind_of(i)]);
+        target_.push_back(adaptive.target[estimator::order_of(i)]);
         prior_.push_back(prior[estimator::internal_of(i)]);
     }
 }
@@ -99,7 +94,7 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
     std::array<double, 3> worst{};
     for (std::size_t i = 0; i < target_.size(); ++i) {
         const double sigma = std::sqrt(covariance[i * target_.size() + i]);
-        worst[kind_of(i)] = std::max(worst[kind_of(i)], sigma);
+        worst[estimator::order_of(i)] = std::max(worst[estimator::order_of(i)], sigma);
     }
     std::string state = "largest standard errors";
     std::string unmet;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 
@@ -8,13 +7,6 @@ namespace vibrig::record {
 
 /// A disk that refused is tried again after so long.
 inline constexpr std::int64_t kRetryNs = 1'000'000'000;
-
-/// CLOCK_MONOTONIC: disks live in it, whatever clock the daemon has.
-inline std::int64_t steady_ns() {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
 
 /// Tells other programs that a file is being written; the system forgets it with the process. What
 /// cannot be locked is not.

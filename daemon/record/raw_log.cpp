@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "daemon/record/disk.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::record {
 
@@ -101,7 +102,7 @@ bool RawLog::take_gap(Gap& gap) {
 void RawLog::refuse(const std::string& why) {
     good_ = false;
     note_ = why;
-    retry_steady_ns_ = steady_ns() + kRetryNs;
+    retry_steady_ns_ = drivers::steady_now() + kRetryNs;
     forget();
 }
 
@@ -131,7 +132,7 @@ void RawLog::open() {
 void RawLog::flush() {
     if (buffer_.empty()) return;
     if (fd_ < 0) {
-        if (!good_ && steady_ns() < retry_steady_ns_) return forget();
+        if (!good_ && drivers::steady_now() < retry_steady_ns_) return forget();
         open();
         if (fd_ < 0) return;
     }

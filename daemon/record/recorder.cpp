@@ -15,6 +15,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
 #include "daemon/record/dwells_csv.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::record {
 
@@ -148,7 +149,7 @@ void Recorder::show() {
 
 double Recorder::stuck_s() const noexcept {
     if (const auto since = alive_steady_ns_.load(); since != 0) {
-        const auto age = steady_ns() - since;
+        const auto age = drivers::steady_now() - since;
         return age > kPatience_ns ? static_cast<double>(age) * 1e-9 : 0;
     }
     const Time due = due_.load();
@@ -156,7 +157,7 @@ double Recorder::stuck_s() const noexcept {
     return late > kLate ? drivers::to_seconds(late) : 0;
 }
 
-void Recorder::alive() noexcept { alive_steady_ns_.store(steady_ns()); }
+void Recorder::alive() noexcept { alive_steady_ns_.store(drivers::steady_now()); }
 
 void Recorder::loop() {
     while (!stop_.load()) {
@@ -256,7 +257,7 @@ void Recorder::refuse(const std::string& why) {
     lost_.stream = "samples";
     if (lost_.reason.empty()) lost_.reason = why;
     shown_.note = why;
-    retry_steady_ns_ = steady_ns() + kRetryNs;
+    retry_steady_ns_ = drivers::steady_now() + kRetryNs;
 }
 
 /// Both kinds of files are on one disk: what it refuses and that it takes again is reported once.
@@ -382,7 +383,7 @@ void Recorder::take(Head& head) {
                 note(campaign_folder_ + "/" + segment.file);
             },
             [this] { alive(); });
-    committed_steady_ns_ = steady_ns();
+    committed_steady_ns_ = drivers::steady_now();
 }
 
 void Recorder::append_dwells(const std::string& line) {
@@ -464,7 +465,7 @@ void Recorder::look_around() {
 
 void Recorder::commit(bool all) {
     if (!head_) return;
-    const std::int64_t now = steady_ns();
+    const std::int64_t now = drivers::steady_now();
     if (!all && now - committed_steady_ns_ < static_cast<std::int64_t>(settings_.flush_s * 1e9))
         return;
     committed_steady_ns_ = now;
@@ -495,9 +496,9 @@ void Recorder::write_rows() {
 std::string Recorder::journal_head(std::uint64_t entry) {
     if (!journal_head_) return "";
     constexpr std::int64_t kDiskPatience_ns = 2'000'000'000;
-    const std::int64_t until = steady_ns() + kDiskPatience_ns;
+    const std::int64_t until = drivers::steady_now() + kDiskPatience_ns;
     auto head = journal_head_(entry);
-    for (; !head && steady_ns() < until; head = journal_head_(entry)) {
+    for (; !head && drivers::steady_now() < until; head = journal_head_(entry)) {
         alive();
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }

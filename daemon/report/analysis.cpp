@@ -304,8 +304,11 @@ Coefficients final_coefficients(const std::string& path, const std::vector<recor
 
 Frequencies frequencies_of(const tool::Assessed& found, const estimator::Settings& settings) {
     Frequencies hz{};
-    for (std::size_t i = 0; i < kParameters; ++i)
-        hz[i] = found.assessed.over_frequency ? found.spectrum->at_hz(i) : settings.frequency_hz;
+    const bool at_rest = std::ranges::all_of(found.assessed.rates,
+                                             [](const auto& rate) { return rate.level_g == 0; });
+    if (!at_rest) hz.fill(settings.frequency_hz);
+    if (found.assessed.over_frequency)
+        for (std::size_t i = 0; i < kParameters; ++i) hz[i] = found.spectrum->at_hz(i);
     return hz;
 }
 

@@ -1,6 +1,5 @@
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -38,19 +37,12 @@ struct Compared {
     }
 };
 
-bool same_vibration(std::size_t parameter, double now_hz, double then_hz) {
-    constexpr std::size_t kFirstQuadratic = 4;
-    constexpr double kSame = 0.02;  // as at_reference() has it
-    return parameter % estimator::kGroups < kFirstQuadratic ||
-           std::abs(now_hz - then_hz) <= kSame * std::max(now_hz, then_hz);
-}
-
 Compared compared(const Analysis& a, const Earlier& earlier) {
     Compared all;
     for (std::size_t i = 0; i < kParameters; ++i) {
         const auto &now = a.assessed.coefficients[i], &then = earlier.assessed.coefficients[i];
         if (!(now.expanded > 0) || !(then.expanded > 0)) continue;
-        if (same_vibration(i, a.at_hz[i], earlier.at_hz[i]))
+        if (!estimator::is_quadratic(i) || estimator::same_vibration(earlier.at_hz[i], a.at_hz[i]))
             all.add(i, now, then);
         else
             ++all.of_another;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::report {
 
@@ -28,43 +29,48 @@ constexpr std::array<Look, 3> kLooks{Look::line, Look::dashed, Look::dots};
 constexpr std::size_t kMostPoints = 300;
 constexpr std::size_t kApart = 24;  // dots that mark a curve
 
-struct Group {
-    const char* title;
-    const char* unit;
-    std::vector<std::size_t> of;  ///< within a gyro
-};
+constexpr std::array<const char*, 3> kOrders{"Biases", "Linear terms", "Quadratic terms"};
+
+/// Places within a gyro of the coefficients of one order.
+std::vector<std::size_t> of_order(std::size_t order) {
+    std::vector<std::size_t> places;
+    for (std::size_t k = 0; k < estimator::kGroups; ++k)
+        if (estimator::order_of(k) == order) places.push_back(k);
+    return places;
+}
 
 /// Rows of the estimates that a chart shows.
 std::size_t every_of(const std::vector<record::EstimateRow>& rows) {
     return std::max<std::size_t>(1, rows.size() / kMostPoints);
 }
 
-Chart deviations(const Campaign& campaign, const Group& group) {
+Chart deviations(const Campaign& campaign, std::size_t order) {
     const auto& rows = campaign.estimates;
     const double origin = origin_s(campaign);
-    Chart chart{.title = std::string(group.title) + ": standard deviation",
+    const auto places = of_order(order);
+    Chart chart{.title = std::string(kOrders[order]) + ": standard deviation",
                 .x = Axis("time, s"),
-                .y = Axis(std::string("1 sigma, ") + group.unit, true)};
+                .y = Axis(std::string("1 sigma, ") + estimator::parameter_unit(places[0]), true)};
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         // The best and the worst of a gyro; all between them.
         Curve curve{.name = std::string("gyro ") + kGyro[gyro]};
         // One term each is the same for all three, often: none may hide another, and dots stand
         // far enough apart for the lines between them.
-        if (group.of.size() == 1) curve.look = kLooks[gyro];
+        if (places.size() == 1) curve.look = kLooks[gyro];
         const std::size_t step = curve.look == Look::dots
                                      ? std::max(every_of(rows), rows.size() / kApart)
                                      : every_of(rows);
         for (std::size_t i = 0; i < rows.size(); i += step) {
             double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
-            for (const std::size_t k : group.of) {
+            for (const std::size_t k : places) {
                 const double s = rows[i].sigma[gyro * estimator::kGroups + k];
                 least = std::min(least, s);
                 most = std::max(most, s);
                 log_sum += std::log(std::max(s, 1e-300));
             }
             curve.add(drivers::to_seconds(rows[i].time) - origin,
-                      std::exp(log_sum / static_cast<double>(group.of.size())));
-            if (group.of.size() == 1) continue;
+                      std::exp(log_sum / static_cast<double>(places.size())));
+            if (places.size() == 1) continue;
             curve.low.push_back(least);
             curve.high.push_back(most);
         }
@@ -167,13 +173,10 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
     page.section("convergence", "Convergence");
     if (campaign.estimates.size() < 2)
         return page.paragraph("No estimates were recorded along the way.");
-    for (const Group& group :
-         {Group{"Biases", "deg/h", {0}}, Group{"Linear terms", "deg/h/g", {1, 2, 3}},
-          Group{"Quadratic terms", "deg/h/g^2", {4, 5, 6, 7, 8, 9}}})
-        page.figure(deviations(campaign, group).svg(),
-                    group.of.size() > 1
-                        ? "Line: geometric mean of the gyro's terms; band: best to worst."
-                        : "");
+    for (std::size_t order = 0; order < kOrders.size(); ++order)
+        page.figure(
+            deviations(campaign, order).svg(),
+            order > 0 ? "Line: geometric mean of the gyro's terms; band: best to worst." : "");
     page.figure(distances(campaign, a.coefficients).svg(),
                 "Root mean square over the ten coefficients of a gyro.");
 }

@@ -38,14 +38,8 @@ std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
     const auto times = uncertainty::dwell_table(of.table.rows());
     for (std::size_t k = 0; k < of.table.list().size(); ++k) {
         const estimator::DwellRow& row = of.table.list()[k].row;
-        uncertainty::DwellRate rate;
-        rate.run = row.run;
-        rate.position = row.position;
-        rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
-        rate.time_h = times.time_h[static_cast<Index>(k)];
+        auto rate = uncertainty::rate_of(row, times.time_h[static_cast<Index>(k)]);
         for (std::size_t j = 0; j < 3; ++j) {
-            rate.rate[j] = row.rate[j];
-            rate.sigma[j] = std::sqrt(row.variance[j][j]);
             rate.residual_sigma[j] =
                 of.analysis.rate_sigma(static_cast<Index>(k), static_cast<Index>(j));
             rate.residual[j] = row.rate[j] - model[j][static_cast<Index>(k)];
@@ -164,10 +158,8 @@ std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator
 }  // namespace
 
 double SpectrumResult::at_hz(std::size_t parameter) const {
-    const std::size_t internal = estimator::internal_of(parameter);
-    // Bias and linear terms know no frequency.
-    const bool linear = internal / estimator::kGyros < estimator::kDii;
-    if (linear || analysis.gyros[internal % estimator::kGyros].resonant()) return 0;
+    const std::size_t gyro = parameter / estimator::kGroups;
+    if (!estimator::is_quadratic(parameter) || analysis.gyros[gyro].resonant()) return 0;
     return compromise ? std::numeric_limits<double>::quiet_NaN() : reference_hz;
 }
 

@@ -63,7 +63,7 @@ void Acquisition::stop() {
 
 void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
     shown_.in_hand = frames.size();
-    shown_.last_frames = steady_now();
+    shown_.last_frames = drivers::steady_now();
     to_.interlock.arrived(shown_.last_frames);
     for (const auto& frame : frames) {
         --shown_.in_hand;
@@ -208,7 +208,7 @@ void Acquisition::arm_timer() {
     timer_.expires_at(std::chrono::steady_clock::time_point(std::chrono::nanoseconds(deadline)));
     timer_.async_wait([this, deadline](const boost::system::error_code& error) {
         if (error) return;
-        to_.interlock.arrived(steady_now());
+        to_.interlock.arrived(drivers::steady_now());
         const Time woken = clock_.now();
         shown_.lateness.add(woken - deadline);
         on_time(woken);

@@ -2,7 +2,6 @@
 
 #include <atomic>
 
-#include "daemon/interlock/interlock.hpp"
 #include "drivers/base/event_fd.hpp"
 
 namespace vibrig::rt {
@@ -19,7 +18,7 @@ class RealWaiter final : public drivers::Waiter {
             if (pending_.exchange(false)) return true;
             long long left = -1;
             if (deadline != drivers::kNever) {
-                left = deadline - steady_now();
+                left = deadline - drivers::steady_now();
                 if (left <= 0) return false;
             }
             if (event_.wait(left)) event_.clear();
@@ -33,7 +32,7 @@ class RealWaiter final : public drivers::Waiter {
 
 }  // namespace
 
-drivers::Time RealClock::now() const noexcept { return steady_now(); }
+drivers::Time RealClock::now() const noexcept { return drivers::steady_now(); }
 
 std::unique_ptr<drivers::Waiter> RealClock::make_waiter() { return std::make_unique<RealWaiter>(); }
 

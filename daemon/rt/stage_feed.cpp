@@ -33,9 +33,8 @@ StageFeed::Layout StageFeed::bind(const proto::Dbc& dbc, const char* key,
                                   const std::string& message, const char* unit) {
     Layout layout;
     const auto signal = [&](const char* name) {
-        const auto bound = drivers::bind_signal(dbc, key, message + "." + name);
-        drivers::expect_unit(bound, key, message + "." + name,
-                             std::string_view(name) == "Counter" ? "" : unit);
+        const auto bound = drivers::bind_signal(dbc, key, message + "." + name,
+                                                std::string_view(name) == "Counter" ? "" : unit);
         layout.message = bound.message;
         return bound.signal;
     };
@@ -66,8 +65,7 @@ StageFeed::StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings,
                                         std::string("a signal as for ") + kVelocity[1 - i] +
                                             ", or neither: the base's velocity has two components");
         }
-        velocity_[i] = drivers::bind_signal(dbc, kVelocity[i], settings_.velocity[i]);
-        drivers::expect_unit(velocity_[i], kVelocity[i], settings_.velocity[i], "m/s");
+        velocity_[i] = drivers::bind_signal(dbc, kVelocity[i], settings_.velocity[i], "m/s");
     }
     if (velocity_[0] && velocity_[0].signal == velocity_[1].signal)
         throw drivers::BindingError(kVelocity[1], settings_.velocity[1],

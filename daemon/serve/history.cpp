@@ -32,9 +32,8 @@ std::array<double, History::kChannels.size()> values_of(
     std::array<double, 3> largest{kNone, kNone, kNone};  // bias, linear, quadratic
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         if (!s.estimate.observable[i] || !(target[i] > 0)) continue;
-        const std::string_view unit = estimator::parameter_unit(i);
-        const std::size_t kind = unit == "deg/h" ? 0 : unit == "deg/h/g" ? 1 : 2;
-        largest[kind] = std::fmax(largest[kind], s.estimate.sigma[i] / target[i]);
+        double& of_order = largest[estimator::order_of(i)];
+        of_order = std::fmax(of_order, s.estimate.sigma[i] / target[i]);
     }
     const auto flagged = std::ranges::count_if(s.dwells, [](const auto& d) { return d.flagged; });
     const bool filters = s.estimate.samples > 0;

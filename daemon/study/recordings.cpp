@@ -60,8 +60,6 @@ Recording recording_in(const fs::path& folder) {
     return out;
 }
 
-double number_of(const Json& json) { return json.is_number() ? json.get<double>() : std::nan(""); }
-
 /// What is compared of a result: one list each.
 struct ResultLists {
     Json value = Json::array(), u = Json::array(), expanded = Json::array();
@@ -257,7 +255,7 @@ void RecordingSums::add(const Recording& recording, const std::string& bytes) {
     std::size_t worst = estimator::kParameters;
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto entry = [&](const Json& of, const char* key) {
-            return of.is_object() ? number_of(of[key][i]) : std::nan("");
+            return of.is_object() ? proto::number_or_nan(of[key][i]) : std::nan("");
         };
         const double difference = entry(now, "value") - entry(before, "value");
         const double e = difference / std::hypot(entry(now, "expanded"), entry(before, "expanded"));

@@ -19,12 +19,6 @@ constexpr int kReadsToBelieve = 2;
 constexpr auto kLookAtRuns = std::chrono::milliseconds(50);
 constexpr auto kCommandPeriod = std::chrono::seconds(2);
 
-[[nodiscard]] Time steady_now() noexcept {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-}
-
 [[nodiscard]] std::string utc_text() {
     const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     tm fields{};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -18,6 +19,13 @@ inline constexpr Time kNever = std::numeric_limits<Time>::max();
 /// s to ns, rounded to the nearest whole microsecond; |s| below 9e9.
 [[nodiscard]] constexpr Time from_seconds(double s) {
     return static_cast<Time>(s * 1e6 + (s < 0 ? -0.5 : 0.5)) * kMicrosecond;
+}
+
+/// CLOCK_MONOTONIC, whatever clock the rig has.
+[[nodiscard]] inline Time steady_now() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
 }
 
 /// Where one thread sleeps. Made by a Clock, owned by the thread that waits.

@@ -20,11 +20,9 @@ const char* name_of(GimbalState state) noexcept {
 
 Gimbal::Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port)
     : message_(nullptr), settings_(settings), port_(port) {
-    const std::string key = "can.signals.gimbal_command";
     const auto bind = [&](const char* signal, const char* unit = "") {
-        const std::string name = settings_.message + "." + signal;
-        const BoundSignal bound = bind_signal(dbc, key, name);
-        expect_unit(bound, key, name, unit);
+        const BoundSignal bound =
+            bind_signal(dbc, "can.signals.gimbal_command", settings_.message + "." + signal, unit);
         message_ = bound.message;
         return bound.signal;
     };

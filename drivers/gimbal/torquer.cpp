@@ -12,9 +12,8 @@ namespace vibrig::drivers {
 Torquer::Torquer(const proto::Dbc& dbc, const TorquerSettings& settings, CanPort& port)
     : settings_(settings), port_(port) {
     const auto bind = [&](const char* signal, const char* unit = "") {
-        const std::string name = settings_.message + "." + signal;
-        const BoundSignal bound = bind_signal(dbc, "levelling.torque_message", name);
-        expect_unit(bound, "levelling.torque_message", name, unit);
+        const BoundSignal bound =
+            bind_signal(dbc, "levelling.torque_message", settings_.message + "." + signal, unit);
         message_ = bound.message;
         return bound.signal;
     };

@@ -105,4 +105,11 @@ BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std
     throw BindingError(key, name, "Message.Signal of the DBC, which offers " + nearest(all, name));
 }
 
+BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name,
+                        std::string_view unit) {
+    const BoundSignal bound = bind_signal(dbc, key, name);
+    expect_unit(bound, key, name, unit);
+    return bound;
+}
+
 }  // namespace vibrig::drivers

@@ -24,5 +24,8 @@ struct BoundSignal {
 /// left to commissioning; an empty `unit` expects none.
 void expect_unit(const BoundSignal& bound, const std::string& key, const std::string& name,
                  std::string_view unit);
+/// The one and the other.
+[[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key,
+                                      const std::string& name, std::string_view unit);
 
 }  // namespace vibrig::drivers

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 
+#include "estimator/filter/median.hpp"
 #include "estimator/filter/text.hpp"
 
 namespace vibrig::estimator::allan {
@@ -23,12 +24,6 @@ void count_gaps(std::span<const double> values, Series& series) {
         series.missing += gap > 0 ? 1 : 0;
         series.longest_gap = std::max(series.longest_gap, gap);
     }
-}
-
-double median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 }  // namespace

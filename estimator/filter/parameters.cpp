@@ -5,14 +5,11 @@
 namespace vibrig::estimator {
 namespace {
 
-const CoefficientRow& row_at(std::size_t public_index) noexcept {
-    return kCoefficientTable[kPublicGroup[public_index % kGroups]];
-}
-
 std::array<std::string, kParameters> made_names() {
     std::array<std::string, kParameters> names;
     for (std::size_t i = 0; i < kParameters; ++i)
-        names[i] = std::string("D_") + row_at(i).letters + "xyz"[i / kGroups];
+        names[i] = std::string("D_") + kCoefficientTable[kPublicGroup[i % kGroups]].letters +
+                   "xyz"[i / kGroups];
     return names;
 }
 
@@ -30,7 +27,7 @@ const std::array<const char*, kParameters>& parameter_names() noexcept {
 
 const char* parameter_unit(std::size_t index) noexcept {
     constexpr std::array<const char*, 3> kUnits{"deg/h", "deg/h/g", "deg/h/g^2"};
-    return kUnits[static_cast<std::size_t>(row_at(index).order)];
+    return kUnits[order_of(index)];
 }
 
 ParameterArray prior_sigma(const Settings& settings) noexcept {

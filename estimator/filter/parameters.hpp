@@ -28,6 +28,14 @@ using ParameterArray = std::array<double, kParameters>;
 
 /// D_Fx D_Ix D_Ox D_Sx D_IIx D_OOx D_SSx D_IOx D_ISx D_OSx, then y, z (IEEE Std 517 usage).
 [[nodiscard]] const std::array<const char*, kParameters>& parameter_names() noexcept;
+/// Of the specific force: 0 constant, 1 linear, 2 quadratic.
+[[nodiscard]] constexpr std::size_t order_of(std::size_t public_index) noexcept {
+    return static_cast<std::size_t>(kCoefficientTable[kPublicGroup[public_index % kGroups]].order);
+}
+/// Those that depend on the vibration that they were determined under.
+[[nodiscard]] constexpr bool is_quadratic(std::size_t public_index) noexcept {
+    return order_of(public_index) == 2;
+}
 /// "deg/h", "deg/h/g" or "deg/h/g^2".
 [[nodiscard]] const char* parameter_unit(std::size_t index) noexcept;
 

@@ -78,10 +78,17 @@ struct Settings {
     std::vector<uncertainty::Misfit> free;  ///< structural classes that the data determine as well
 };
 
+/// Whether what shakes at `hz` is the vibration at `reference_hz`: within 2 %. At rest, 0, is none
+/// but itself.
+[[nodiscard]] constexpr bool same_vibration(double hz, double reference_hz) noexcept {
+    constexpr double kSame = 0.02;
+    return hz == reference_hz ||
+           (hz > (1 - kSame) * reference_hz && hz < (1 + kSame) * reference_hz);
+}
+
 /// Whether coefficients at Settings::frequency_hz are to take up what shakes at `hz`.
 [[nodiscard]] inline bool at_reference(const Settings& settings, double hz) noexcept {
-    constexpr double kSame = 0.02;
-    return hz > (1 - kSame) * settings.frequency_hz && hz < (1 + kSame) * settings.frequency_hz;
+    return same_vibration(hz, settings.frequency_hz);
 }
 
 /// Noise as the filter takes it.

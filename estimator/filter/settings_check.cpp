@@ -24,12 +24,6 @@ void require_axis(const SignedAxis& axis, const std::string& key) {
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 bool non_negative(double value) { return std::isfinite(value) && value >= 0; }
 
-double determinant(const std::array<std::array<double, 3>, 3>& m) {
-    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
 void check_platform(const Settings& s) {
     static constexpr std::array<const char*, 3> kAxesKey{
         "platform.gyro_x_axes", "platform.gyro_y_axes", "platform.gyro_z_axes"};
@@ -56,6 +50,12 @@ void check_platform(const Settings& s) {
 }
 
 }  // namespace
+
+double determinant(const std::array<std::array<double, 3>, 3>& m) noexcept {
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
 
 void check(const Settings& s) {
     require(std::abs(s.latitude_deg) <= 90, "site.latitude_deg", s.latitude_deg, "-90 to 90");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,8 @@ namespace vibrig::estimator {
 
 /// Throws SettingsError at the first setting that cannot work.
 void check(const Settings& settings);
+
+[[nodiscard]] double determinant(const std::array<std::array<double, 3>, 3>& m) noexcept;
 
 /// What is permitted but hardly meant.
 struct DoubtfulKey {

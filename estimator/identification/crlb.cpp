@@ -1,12 +1,12 @@
 #include "estimator/identification/crlb.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "estimator/filter/angles.hpp"
 #include "estimator/filter/drift_filter.hpp"
+#include "estimator/filter/median.hpp"
 #include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/observability.hpp"
 #include "estimator/identification/planned_covariance.hpp"
@@ -143,9 +143,7 @@ double median_interval(std::vector<double>& times_s) {
     if (times_s.size() < 2) return 0;
     for (std::size_t i = 0; i + 1 < times_s.size(); ++i) times_s[i] = times_s[i + 1] - times_s[i];
     times_s.pop_back();
-    const auto middle = times_s.begin() + static_cast<std::ptrdiff_t>(times_s.size() / 2);
-    std::nth_element(times_s.begin(), middle, times_s.end());
-    return *middle;
+    return median(times_s);
 }
 
 }  // namespace vibrig::estimator

@@ -4,17 +4,9 @@
 #include <cmath>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/median.hpp"
 
 namespace vibrig::estimator {
-namespace {
-
-double median(std::vector<double>& values) noexcept {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-}  // namespace
 
 DwellBuffer::DwellBuffer(double span_s, double longest_s, double rate_hz)
     : span_s_(span_s), rate_hz_(rate_hz) {

@@ -203,7 +203,11 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     } else if (2 * r.locked > r.samples) {
         flag("the inner gimbal is beyond 80 deg: dwell rejected", true);
     } else if (r.level_samples <= 0) {
-        flag("no usable specific force", true);
+        flag(2 * r.forces > r.samples
+                 ? "readings are too few or too far apart to know the vibration level: dwell "
+                   "rejected"
+                 : "no usable specific force",
+             true);
     } else if (sparse) {
         flag("too many readings are missing to know the vibration level: dwell rejected", true);
     } else if (r.saturated_axis >= 0) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/filter/parameters.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {
@@ -111,12 +112,6 @@ void find_strongest_correlation(const Matrix& cov, const std::vector<std::size_t
     }
 }
 
-/// Of a term of the model: constant, linear, quadratic.
-int degree_of(std::size_t term) {
-    constexpr std::size_t kFirstQuadratic = 4;
-    return term == 0 ? 0 : term < kFirstQuadratic ? 1 : 2;
-}
-
 }  // namespace
 
 std::vector<std::size_t> active(const Terms& terms) {
@@ -151,8 +146,7 @@ Matrix scaled_rows(const Problem& problem, Vector& scale) {
     for (std::size_t i = 0; i < terms.size(); ++i) {
         double largest = 0;
         for (std::size_t k = 0; k < terms.size(); ++k)
-            if (degree_of(terms[k]) == degree_of(terms[i]))
-                largest = std::max(largest, found[at(k)]);
+            if (order_of(terms[k]) == order_of(terms[i])) largest = std::max(largest, found[at(k)]);
         if (!(found[at(i)] > kRankTolerance * largest))
             scale[at(i)] = largest > 0 ? largest : found.maxCoeff();
     }

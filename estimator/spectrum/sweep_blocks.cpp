@@ -8,6 +8,7 @@
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/mapped.hpp"
+#include "estimator/filter/median.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -68,9 +69,7 @@ Sweep SweepBlocks::finish() {
 double SweepBlocks::shown() const {
     if (shares_.empty()) return 1;
     auto shares = shares_;
-    const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-    std::ranges::nth_element(shares, middle);
-    return *middle;
+    return median(shares);
 }
 
 void SweepBlocks::end_block() {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimator/filter/mapped.hpp"
+#include "estimator/filter/median.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
@@ -206,26 +207,13 @@ void tell_cross_axis(const DwellTable& table, Assessment& out) {
 void tell_rates(const DwellTable& table, const VectorXd& residual, const VectorXd& variance,
                 Assessment& out) {
     for (std::size_t k = 0; k < table.rows.size(); ++k) {
-        const DwellRow& row = table.rows[k];
-        DwellRate rate;
-        rate.run = row.run;
-        rate.position = row.position;
-        rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
-        rate.time_h = table.time_h[index(k)];
+        DwellRate rate = rate_of(table.rows[k], table.time_h[index(k)]);
         for (std::size_t j = 0; j < 3; ++j) {
-            rate.rate[j] = row.rate[j];
-            rate.sigma[j] = std::sqrt(row.variance[j][j]);
             rate.residual[j] = residual[index(3 * k + j)];
             rate.residual_sigma[j] = std::sqrt(variance[index(3 * k + j)]);
         }
         out.rates.push_back(rate);
     }
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 void tell_combinations(const Result& result, const VectorXd& value, const MatrixXd& combined,
@@ -277,6 +265,17 @@ void tell_coefficients(const Settings& settings, const Result& result, const Dwe
 }
 
 }  // namespace
+
+DwellRate rate_of(const DwellRow& row, double time_h) {
+    DwellRate rate;
+    rate.run = row.run;
+    rate.position = row.position;
+    rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
+    rate.time_h = time_h;
+    rate.rate = row.rate;
+    for (std::size_t j = 0; j < 3; ++j) rate.sigma[j] = std::sqrt(row.variance[j][j]);
+    return rate;
+}
 
 const char* word_of(Level level) noexcept {
     return level == Level::valid ? "valid" : level == Level::doubtful ? "doubtful" : "not valid";

@@ -76,6 +76,9 @@ struct DwellRate {
     std::array<double, 3> rate{}, sigma{}, residual{}, residual_sigma{};  ///< deg/h
 };
 
+/// Without what is left of it.
+[[nodiscard]] DwellRate rate_of(const DwellRow& row, double time_h);
+
 struct CrossAxis {
     int run = 0;
     LevelTensor gamma = kVertical;  ///< mean over its vibrating dwells

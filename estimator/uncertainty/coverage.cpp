@@ -23,9 +23,11 @@ constexpr auto kOfLinear = static_cast<Index>(internal_index(kDi, 0)),
                kOfQuadratic = static_cast<Index>(internal_index(kDii, 0));
 
 void use_again(const Inputs& in, std::size_t internal, double growth, Coefficient& c) {
-    // Stays NaN while nobody has said how it repeats.
-    if (!in.turn_on_bias || !in.turn_on_linear) return;
     const std::size_t group = internal / kGyros;
+    // Stays NaN while nobody has said how it repeats. Of quadratic terms nothing can be said: they
+    // have it where all others have.
+    if (group != kDt && !in.turn_on_linear) return;
+    if ((group == kDt || group > kDo) && !in.turn_on_bias) return;
     double square = c.u * c.u;
     if (group == kDt) {
         const Declared seen{std::abs(growth) / 2 / std::sqrt(3.0)};

@@ -296,6 +296,14 @@ struct Calibration::Impl {
                              name(i), point.zero_mg[i], name(i), down ? "up" : "down",
                              down ? "down" : "up", down ? "is too much" : "is missing"));
                 }
+                if (i == 2 && std::abs(point.zero_mg[i]) > kNearTwoG_mg)
+                    return give_up(
+                        text("zero of accelerometer %c is %.4g mg, outside the small-error range "
+                             "of %.0f mg: it shows about %.2g g, expected 1 g: the unit of "
+                             "velocities or times, increments that are missing, or %c is not %s",
+                             name(i), point.zero_mg[i], kLargestZero_mg,
+                             1 + (settings.inverted ? -1e-3 : 1e-3) * point.zero_mg[i], name(i),
+                             settings.inverted ? "down" : "up"));
                 return give_up(
                     text("zero of accelerometer %c is %.4g mg, outside the small-error range of "
                          "%.0f mg: level first",

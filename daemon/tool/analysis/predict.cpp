@@ -53,7 +53,7 @@ struct Held {
 
 /// That shook as the profile has it: its sine at its level, or at random by its name.
 bool under(const Profile& profile, const AtPlatform& vibration, const HeldOut& held) {
-    constexpr double kSame = 0.02, kSamePower = 1.26;  // 1 dB
+    constexpr double kSameShare = 0.02, kSamePower = 1.26;  // 1 dB
     const estimator::DwellRow& row = held.row;
     if (!(row.vibration.kappa > 1)) return false;
     if (!profile.psd.empty()) return row.random && held.kind.profile == profile.name;
@@ -61,14 +61,14 @@ bool under(const Profile& profile, const AtPlatform& vibration, const HeldOut& h
     const double power = level_moment(row.vibration).trace() / vibration.moment.trace();
     if (!(power < kSamePower && power > 1 / kSamePower)) return false;
     if (profile.sines.size() == 1 && held.kind.bands.size() <= 1)
-        return std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame;
+        return estimator::same_vibration(row.frequency_hz, profile.sines.front().first);
     double all = 0;
     for (const auto& [hz, peak] : profile.sines) all += peak * peak;
     return held.kind.bands.size() == profile.sines.size() &&
            std::ranges::all_of(profile.sines, [&](const auto& sine) {
                return std::ranges::any_of(held.kind.bands, [&](const Band& band) {
-                   return std::abs(band.hz / sine.first - 1) < kSame &&
-                          std::abs(band.share - sine.second * sine.second / all) < kSame;
+                   return estimator::same_vibration(band.hz, sine.first) &&
+                          std::abs(band.share - sine.second * sine.second / all) < kSameShare;
                });
            });
 }

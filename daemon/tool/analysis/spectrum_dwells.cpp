@@ -18,8 +18,6 @@ namespace {
 using estimator::spectrum::Band;
 using SpectraJson = nlohmann::json;
 
-constexpr double kSameFrequency = 0.02;  ///< relative: the rules of the reference frequency
-
 int count_of(const SpectraJson& entry, const char* key, const std::string& place) {
     const auto found = entry.find(key);
     if (found == entry.end() || !found->is_number_integer() || found->get<int>() < 1)
@@ -121,8 +119,7 @@ std::vector<Band> bands_of_lines(const Pairs& lines) {
 bool alike(const std::vector<Band>& a, const std::vector<Band>& b) {
     return a.size() == b.size() &&
            std::equal(a.begin(), a.end(), b.begin(), [](const Band& x, const Band& y) {
-               return std::abs(x.hz / y.hz - 1) < kSameFrequency / 10 &&
-                      std::abs(x.share - y.share) < 0.01;
+               return std::abs(x.hz / y.hz - 1) < 0.002 && std::abs(x.share - y.share) < 0.01;
            });
 }
 
@@ -247,7 +244,7 @@ std::optional<std::size_t> DwellKinds::reference() const {
     long largest = 0;
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
         if (!kinds_[k].profile.empty()) continue;
-        if (std::abs(kinds_[k].hz() / configured_hz_ - 1) < kSameFrequency) return k;
+        if (estimator::same_vibration(kinds_[k].hz(), configured_hz_)) return k;
         const auto count = std::count(of_dwell_.begin(), of_dwell_.end(), std::optional(k));
         if (count <= largest) continue;
         largest = count;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/results/text_line.hpp"
+#include "estimator/filter/median.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -87,11 +88,8 @@ std::string advices(const Assessment& assessed) {
     return text;
 }
 
-double middle_of(std::vector<double> values) {
-    if (values.empty()) return kNone;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+double middle_of(std::vector<double>& values) {
+    return values.empty() ? kNone : estimator::median(values);
 }
 
 }  // namespace

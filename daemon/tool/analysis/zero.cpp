@@ -28,7 +28,7 @@ namespace {
 struct Options {
     zeros::CalibrationSettings calibration;
     double latitude_deg = 45.75;
-    std::optional<double> heading_deg;
+    std::optional<double> heading_deg, gravity_mps2;
     double scale_ppm = 100;
     double misalignment_arcsec = 50;
     std::vector<double> slews{0, 90, -90, 90};
@@ -53,6 +53,7 @@ struct Options {
 zeros::CalibrationSettings settings_of(const Options& options) {
     zeros::CalibrationSettings s = options.calibration;
     s.site.latitude_rad = options.latitude_deg * estimator::kRadPerDeg;
+    s.site.gravity_mps2 = options.gravity_mps2.value_or(s.site.gravity_mps2);
     s.noise.scale_factor = options.scale_ppm * 1e-6;
     s.noise.misalignment = options.misalignment_arcsec * kRadPerArcsec;
     s.plan.targets_deg = options.slews;
@@ -95,10 +96,13 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
     if (!options.plot.empty()) plot_runs(options.plot, runs);
     // A simulated unit stands as it is told.
     const bool assumed = !options.file.empty() && !options.heading_deg;
+    const bool gravity_assumed = !options.file.empty() && !options.gravity_mps2;
     if (options.json) {
         Json json = result_json(result, seen);
         json["heading_deg"] = s.heading_deg;
         json["heading_assumed"] = assumed;
+        json["gravity_mps2"] = s.site.gravity_mps2;
+        json["gravity_assumed"] = gravity_assumed;
         if (apart) {
             json["apart"] = apart_json(*apart);
         }
@@ -109,6 +113,13 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
             std::cout << "assumed: at azimuth 0 the unit's "
                       << kAxisLetters[static_cast<std::size_t>(result.upright + 1) % 3]
                       << " points true east (--heading)\n";
+        // A unit that is sure of 0.1 mg cannot tell its zero from 1e-4 of gravity.
+        if (gravity_assumed)
+            std::cout << printed(
+                "assumed: gravity is %g m/s^2 (--gravity); %s is off by 1 mg for each %.2g that it "
+                "is off\n",
+                s.site.gravity_mps2, kAxisLetters[static_cast<std::size_t>(result.upright)],
+                1e-3 * s.site.gravity_mps2);
         if (apart) {
             std::cout << apart_table(*apart);
         }
@@ -258,7 +269,8 @@ void refuse_file(const CLI::App& command, const Options& options) {
 void add_common(CLI::App& command, Options& o) {
     zeros::CalibrationSettings& s = o.calibration;
     add_number(command, "--latitude", o.latitude_deg, "deg (45.75)", -89, 89);
-    add_number(command, "--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)", 1, 30);
+    add_number(command, "--gravity", o.gravity_mps2, "where the unit stands, m/s^2 (9.80665)", 1,
+               30);
     add_number(command, "--heading", o.heading_deg,
                "of platform x (of z with --upright y, --y-up and --y-down) at azimuth 0, deg from "
                "true east, counter-clockwise about up: 90 is north (0)",

@@ -7,6 +7,7 @@
 #include "daemon/results/text_line.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool::studies {
 
@@ -15,8 +16,6 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr std::size_t kMostShown = 30;
-
-double value_of(const Json& json) { return json.is_number() ? json.get<double>() : std::nan(""); }
 
 std::string word_of(const Json& result) {
     return result.is_object() && result["verdict"].is_string()
@@ -31,7 +30,7 @@ std::string name_of(const Json& one) {
 /// Of the coefficient at `i` in `one`'s old or new result.
 double entry(const Json& one, const char* which, const char* key, std::size_t i) {
     const Json& result = one.at(which);
-    return result.is_object() ? value_of(result.at(key).at(i)) : std::nan("");
+    return result.is_object() ? proto::number_or_nan(result.at(key).at(i)) : std::nan("");
 }
 
 std::size_t place_of(const std::string& coefficient) {
@@ -57,8 +56,8 @@ std::string row(const Json& one) {
     return line("%-28s %-10s %-22s %-6s %12.6f %12.6f %10.3g %8.3f%s", name_of(one).c_str(),
                 one.at("serial").get<std::string>().c_str(), words.c_str(), coefficient.c_str(),
                 entry(one, "old", "value", i), entry(one, "new", "value", i),
-                value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i)),
-                mark_of(one).c_str());
+                proto::number_or_nan(one.at("difference_sigma").at(i)),
+                proto::number_or_nan(one.at("e_n").at(i)), mark_of(one).c_str());
 }
 
 std::string csv_text(const std::string& text) {
@@ -98,10 +97,10 @@ std::string recordings_csv(const Json& result) {
                    word_of(one.at("old")) + "," + word_of(one.at("new")) + "," +
                    std::string(estimator::parameter_names()[i]) + "," +
                    std::string(estimator::parameter_unit(i));
-            for (const double value :
-                 {entry(one, "old", "value", i), entry(one, "old", "u", i),
-                  entry(one, "new", "value", i), entry(one, "new", "u", i),
-                  value_of(one.at("difference_sigma").at(i)), value_of(one.at("e_n").at(i))})
+            for (const double value : {entry(one, "old", "value", i), entry(one, "old", "u", i),
+                                       entry(one, "new", "value", i), entry(one, "new", "u", i),
+                                       proto::number_or_nan(one.at("difference_sigma").at(i)),
+                                       proto::number_or_nan(one.at("e_n").at(i))})
                 out += csv_number(value);
             out += "\n";
         }
@@ -117,7 +116,7 @@ void write_recordings_hdf5(const Json& result, const std::string& path) {
         for (const Json& one : result.at("recordings")) {
             if (one.contains("failed")) continue;
             for (std::size_t i = 0; i < estimator::kParameters; ++i)
-                values.push_back(which == nullptr ? value_of(one.at(key).at(i))
+                values.push_back(which == nullptr ? proto::number_or_nan(one.at(key).at(i))
                                                   : entry(one, which, key, i));
             ++rows;
         }

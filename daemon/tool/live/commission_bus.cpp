@@ -16,6 +16,7 @@
 #include "daemon/commission/bus_list.hpp"
 #include "daemon/commission/bus_signals.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/journal/signed_head.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_client.hpp"
@@ -164,9 +165,8 @@ std::size_t prove_bits(const BusOptions& options, const proto::Dbc& dbc,
             }
         }
     }
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
     commission::BitBook(options.folder, record::sha256_of_file(options.dbc))
-        .keep(proven, std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+        .keep(proven, journal::utc_now());
     std::cerr << proven.size() << " bits proven, " << left << " left out; kept in "
               << options.folder << '\n';
     return left;

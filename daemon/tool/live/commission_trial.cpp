@@ -13,6 +13,7 @@
 #include "daemon/commission/register_trial.hpp"
 #include "daemon/commission/trial_log.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/journal/signed_head.hpp"
 #include "daemon/lock/rig_lock.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_client.hpp"
@@ -172,12 +173,10 @@ int try_registers(const RegisterOptions& options) {
     for (const auto& row : trial.rows())
         rows.push_back({{"name", row.name}, {"passed", row.passed}, {"found", row.found}});
     log.add("verdict", {{"outcome", outcome}, {"why", why}, {"rows", rows}});
-    if (why.empty() && trial.passed()) {
-        const auto now = std::chrono::system_clock::now().time_since_epoch();
+    if (why.empty() && trial.passed())
         commission::TriedRegisters(rig.commission.folder)
             .keep(commission::TriedRegisters::keys_of(loaded), options.by, device,
-                  std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-    }
+                  journal::utc_now());
     if (options.json) {
         std::cout << proto::json_text(CommissionJson{{"outcome", outcome},
                                                      {"why", why},

@@ -192,7 +192,7 @@ std::string ArchivePages::campaign(archive::Index& index, const archive::Entry& 
                     "</td><td class=\"number\">" + printed("%.6f", c->u) +
                     "</td><td class=\"number\">" + printed("%.6f", c->expanded) + "</td><td>" +
                     estimator::parameter_unit(i) +
-                    (archive::is_quadratic(i) ? " " + archive::vibration_text(c->at_hz) : "") +
+                    (estimator::is_quadratic(i) ? " " + archive::vibration_text(c->at_hz) : "") +
                     "</td></tr>";
     auto all = index.files(entry.key);
     if (fs::exists(fs::path(place_.folder) / entry.key / "report.html"))

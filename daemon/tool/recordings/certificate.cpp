@@ -13,6 +13,7 @@
 #include <sstream>
 #include <string>
 
+#include "daemon/journal/signed_head.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/record/shaken.hpp"
@@ -286,9 +287,7 @@ nlohmann::ordered_json certificate_for(const record::Campaign& campaign, const I
 }
 
 int certify(const CertificateArguments& arguments) {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    Issue issue = read_paper(arguments.paper,
-                             std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+    Issue issue = read_paper(arguments.paper, journal::utc_now());
     issue.by = arguments.by;
     CertificateFiles files(arguments.output);
     if (!arguments.no_journal) look_for_daemon(arguments);

@@ -29,7 +29,7 @@ inline Entry entry_of(const std::string& serial, int number, double value = 1, d
     one.verdict = "valid";
     for (std::size_t i = 0; i < one.coefficients.size(); ++i)
         one.coefficients[i] =
-            Coefficient{value, u, u, u, 2 * u, is_quadratic(i) ? at_hz : std::nullopt};
+            Coefficient{value, u, u, u, 2 * u, estimator::is_quadratic(i) ? at_hz : std::nullopt};
     return one;
 }
 

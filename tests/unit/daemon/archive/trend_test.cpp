@@ -167,7 +167,7 @@ std::vector<Entry> at_two_frequencies(std::mt19937& random, const std::vector<do
         made.push_back(entry_of("1", static_cast<int>(n), 1, kU, hz[n]));
         for (std::size_t i = 0; i < estimator::kParameters; ++i)
             made.back().coefficients[i]->value =
-                (hz[n] == 25 && is_quadratic(i) ? 4 : 1) + normal(random);
+                (hz[n] == 25 && estimator::is_quadratic(i) ? 4 : 1) + normal(random);
     }
     return made;
 }

@@ -43,6 +43,13 @@ TEST(DeclaredInputs, WhatNobodyStatedIsShownAndStaysUndeclared) {
                     .estimator.uncertainty.resolver_harmonics_declared);
     EXPECT_THAT(complaint("uncertainty.resolver_harmonics = [{ order = 2, arcsec = 1, u = 3 }]"),
                 HasSubstr("uncertainty.resolver_harmonics[0]"));
+    EXPECT_THAT(complaint("uncertainty.resolver_harmonics = [{ order = 0, arcsec = 1 }]"),
+                HasSubstr("uncertainty.resolver_harmonics[0].order: found 0, expected"));
+    // Both at once would be taken for one that is larger than either.
+    EXPECT_THAT(complaint("uncertainty.resolver_harmonics = "
+                          "[{ order = 16, arcsec = 3 }, { order = 16, arcsec = 4 }]"),
+                HasSubstr("uncertainty.resolver_harmonics[1]: found order 16 once more, expected "
+                          "each order once"));
 }
 
 TEST(DeclaredInputs, ForAnotherPowerOnAreNumbersOrTables) {

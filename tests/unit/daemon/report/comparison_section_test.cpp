@@ -62,6 +62,23 @@ TEST_F(Comparison, WhatIsOfAnotherVibrationIsLeftOutAndCounted) {
     EXPECT_THAT(page(), HasSubstr("Left out: 1 quadratic coefficients"));
 }
 
+TEST_F(Comparison, OneVibrationIsWithinTwoPercent) {
+    then_.at_hz.fill(15.29);
+    EXPECT_THAT(page(), HasSubstr("<td>D_IIx</td>"));
+    then_.at_hz.fill(15.31);
+    EXPECT_THAT(page(), HasSubstr("Left out: 1 quadratic coefficients"));
+}
+
+TEST_F(Comparison, WhatWasDeterminedAtRestIsOfNoFrequency) {
+    estimator::Settings settings;
+    settings.frequency_hz = 15;
+    tool::Assessed found;
+    found.assessed.rates.resize(2);
+    EXPECT_EQ(frequencies_of(found, settings)[kDIIx], 0);
+    found.assessed.rates[1].level_g = 0.5;
+    EXPECT_EQ(frequencies_of(found, settings)[kDIIx], 15);
+}
+
 TEST_F(Comparison, WithoutAnUncertaintyOfBothThereIsNoScore) {
     then_.assessed.done = false;
     EXPECT_THAT(page(), HasSubstr("E_n cannot be had: the uncertainty of the earlier campaign"));

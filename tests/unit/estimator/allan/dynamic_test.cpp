@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <limits>
 #include <random>
+#include <span>
 
 #include "estimator/allan/dynamic.hpp"
 #include "estimator/allan/monitor.hpp"
@@ -202,26 +203,41 @@ struct Alarms {
     int steps = 0;
 };
 
+/// Counts the windows of a record that are compared, with white noise of kN or, `taught`, with the
+/// first five.
+void watch(std::span<const double> rate, std::size_t window, double alpha, bool taught,
+           Alarms& out) {
+    DynamicSettings wanted = settings(window);
+    wanted.fits = false;
+    DynamicAllan dynamic(wanted);
+    StationarityMonitor monitor({alpha, 5}, dynamic);
+    if (!taught) monitor.set_reference({0, kN, 0, 0, 0});
+    for (const double y : rate) {
+        if (!dynamic.add(y)) continue;
+        const bool compared = monitor.has_reference();
+        const WindowRow row = dynamic.row();
+        EXPECT_FALSE(row.refused);
+        const auto alarms = monitor.check(row);
+        out.windows += compared ? 1 : 0;
+        out.alarmed += alarms.empty() ? 0 : 1;
+        for (const Alarm& alarm : alarms) {
+            const bool step = alarm.reading == Reading::mean_step;
+            out.steps += step ? 1 : 0;
+            EXPECT_TRUE(std::isfinite(alarm.ratio) && (alarm.ratio > 0 || step)) << alarm.tau;
+        }
+    }
+    EXPECT_EQ(dynamic.faults(), 0U);
+}
+
 /// Windows after a learnt reference, level `alpha`.
 Alarms learnt(const Terms& terms, double alpha, int runs, std::uint64_t seed) {
     constexpr std::size_t kWindow = 256;
     constexpr std::size_t kHops = 46;  // of half a window: 45 windows, the first five teach
     Alarms out;
-    for (int run = 0; run < runs; ++run) {
-        DynamicSettings wanted = settings(kWindow);
-        wanted.fits = false;
-        DynamicAllan dynamic(wanted);
-        StationarityMonitor monitor({alpha, 5}, dynamic);
-        for (const double y : synthetic_rate(terms, kHops * kWindow / 2, 1.0,
-                                             seed + static_cast<std::uint64_t>(run))) {
-            if (!dynamic.add(y)) continue;
-            const bool taught = monitor.has_reference();
-            const auto alarms = monitor.check(dynamic.row());
-            out.windows += taught ? 1 : 0;
-            out.alarmed += alarms.empty() ? 0 : 1;
-            for (const Alarm& alarm : alarms) out.steps += alarm.reading == Reading::mean_step;
-        }
-    }
+    for (int run = 0; run < runs; ++run)
+        watch(
+            synthetic_rate(terms, kHops * kWindow / 2, 1.0, seed + static_cast<std::uint64_t>(run)),
+            kWindow, alpha, true, out);
     return out;
 }
 
@@ -261,27 +277,12 @@ Alarms with_gaps(double missing, bool taught, double alpha, unsigned runs) {
     constexpr std::uint64_t kSeed = 9100;
     Alarms out;
     for (unsigned run = 0; run < runs; ++run) {
-        DynamicSettings wanted = settings(kWindow);
-        wanted.fits = false;
-        DynamicAllan dynamic(wanted);
-        StationarityMonitor monitor({alpha, 5}, dynamic);
-        if (!taught) monitor.set_reference({0, kN, 0, 0, 0});
         std::mt19937_64 generator(kSeed + 1000 + run);
         std::bernoulli_distribution gone(missing);
-        for (const double y : white(60 * kWindow, kSigma, kSeed + run)) {
-            if (!dynamic.add(gone(generator) ? kNaN : y)) continue;
-            const bool compared = monitor.has_reference();
-            const WindowRow row = dynamic.row();
-            EXPECT_FALSE(row.refused);
-            const auto alarms = monitor.check(row);
-            for (const Alarm& alarm : alarms) {
-                EXPECT_TRUE(std::isfinite(alarm.ratio)) << alarm.tau;
-                EXPECT_TRUE(alarm.ratio > 0 || alarm.reading == Reading::mean_step) << alarm.tau;
-            }
-            out.windows += compared ? 1 : 0;
-            out.alarmed += alarms.empty() ? 0 : 1;
-        }
-        EXPECT_EQ(dynamic.faults(), 0U) << missing;
+        auto rate = white(60 * kWindow, kSigma, kSeed + run);
+        for (double& y : rate)
+            if (gone(generator)) y = kNaN;
+        watch(rate, kWindow, alpha, taught, out);
     }
     return out;
 }

@@ -259,6 +259,20 @@ TEST(Robustness, ADwellWithMostReadingsMissingIsRefusedForThat) {
     expect_within_four_sigma(result);
 }
 
+TEST(Robustness, ReadingsTooFarApartAreNotCalledOnesWithoutForce) {
+    // GIVEN times in ms, which look like 25 s from one reading to the next
+    Identification to{Settings{}};
+    RigSimulator rig(kSeed);
+    rig.spoil = [](const DwellInfo&, int, Measurement& m) { m.time_s *= 1000; };
+    // THEN it is not the force that is missing
+    EXPECT_STREQ(rig.dwell(to, SimulatedDwell{}).reason,
+                 "readings are too few or too far apart to know the vibration level: dwell "
+                 "rejected");
+    // WHEN there is none THEN that is the reason
+    rig.spoil = [](const DwellInfo&, int, Measurement& m) { m.force_good = false; };
+    EXPECT_STREQ(rig.dwell(to, SimulatedDwell{}).reason, "no usable specific force");
+}
+
 TEST(Robustness, ASaturatedAccelerometerIsNotTakenForALowerLevel) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     // GIVEN accelerometers that stop at 5 g while the platform feels 7

@@ -106,6 +106,14 @@ TEST(Coverage, AnotherPowerOnAddsItsOwnScatterToBiasAndLinearTerms) {
     EXPECT_NEAR(u_use(kDt, 0.6), std::sqrt(u * u + 0.09 + 0.03), 1e-12);
     inputs.ramp_in_dwell = Declared{0.0};
     EXPECT_NEAR(u_use(kDt, 0.6), std::hypot(u, 0.3), 1e-12);
+    // WHEN one of them alone is stated THEN it is known of that
+    inputs.turn_on_linear.reset();
+    EXPECT_NEAR(u_use(kDt, 0), std::hypot(u, 0.3), 1e-12);
+    EXPECT_TRUE(std::isnan(u_use(kDo, 0)) && std::isnan(u_use(kDss, 0)));
+    inputs.turn_on_linear = Declared{0.04};
+    inputs.turn_on_bias.reset();
+    EXPECT_NEAR(u_use(kDo, 0), std::hypot(u, 0.04), 1e-12);
+    EXPECT_TRUE(std::isnan(u_use(kDt, 0)) && std::isnan(u_use(kDss, 0)));
 }
 
 TEST(Coverage, ARampGrowsAsLongAsTheDwellLasts) {

@@ -73,6 +73,34 @@ TEST_F(ZeroCommand, TheHeadingAtAzimuthZeroIsStatedOrSaidToBeAssumed) {
     expect_refusal("zero run.csv --heading nan", "--heading: found nan");
 }
 
+TEST_F(ZeroCommand, GravityIsStatedOrSaidToBeAssumed) {
+    // GIVEN a unit at the equator
+    ASSERT_EQ(vibrig("zero simulate --zero 3,-2,1 --seed 5 --gravity 9.78 --write run.csv"), 0);
+    // WHEN that is stated THEN the zero of z is the unit's
+    const Json stated = json("zero run.csv --gravity 9.78", 0);
+    EXPECT_EQ(stated["gravity_mps2"], 9.78);
+    EXPECT_EQ(stated["gravity_assumed"], false);
+    const double sigma = stated["zeros"][2]["filter_sigma_mg"];
+    EXPECT_NEAR(stated["zeros"][2]["zero_mg"], 1, 5 * sigma + 1e-3);
+    ASSERT_EQ(vibrig("zero run.csv --gravity 9.78"), 0);
+    EXPECT_EQ(out.find("assumed: gravity"), std::string::npos) << out;
+    // AND otherwise z has the difference, and it is said what was taken
+    const Json assumed = json("zero run.csv", 0);
+    EXPECT_EQ(assumed["gravity_mps2"], 9.80665);
+    EXPECT_EQ(assumed["gravity_assumed"], true);
+    EXPECT_NEAR(assumed["zeros"][2]["zero_mg"], 1 + 1e3 * (9.78 / 9.80665 - 1), 5 * sigma + 1e-2);
+    ASSERT_EQ(vibrig("zero run.csv"), 0);
+    EXPECT_NE(out.find("assumed: gravity is 9.80665 m/s^2 (--gravity); z is off by 1 mg for each "
+                       "0.0098 that it is off"),
+              std::string::npos)
+        << out;
+    // AND what is no tilt is not to be levelled
+    EXPECT_EQ(vibrig("zero run.csv --gravity 1"), 1) << out;
+    EXPECT_NE(out.find("g, expected 1 g: the unit of velocities or times"), std::string::npos)
+        << out;
+    EXPECT_EQ(out.find("level first"), std::string::npos) << out;
+}
+
 TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {
     // GIVEN a unit with x 50 arcsec, y -100 arcsec towards z, z 200 ppm too large, both ways
     const std::string unit = "zero simulate --zero 3,-2,1 --misalignment 50,-100 --scale 0,0,200";
