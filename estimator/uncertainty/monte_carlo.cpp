@@ -19,6 +19,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kFewestBlocks = 2, kForLinearity = 200;
+/// JCGM 101, 8.2: what is to tell whether an end is within the tolerance is known to a fifth of it.
+constexpr double kFiner = 5;
 constexpr auto kTogether = static_cast<Index>(kParameters);
 
 /// A draw of unit standard uncertainty.
@@ -196,7 +198,7 @@ double nonlinearity(const Settings& settings, const Result& result, const Assess
     return all > 0 ? std::sqrt(off / all) : 0;
 }
 
-/// The standard error of the blocks' mean, twice, within the tolerance everywhere.
+/// The standard error of the blocks' mean, twice, within a fifth of the tolerance everywhere.
 bool settled(const std::vector<Block>& blocks, const Block& sum, const VectorXd& delta) {
     const auto h = static_cast<double>(blocks.size());
     if (blocks.size() < kFewestBlocks) return false;
@@ -205,7 +207,7 @@ bool settled(const std::vector<Block>& blocks, const Block& sum, const VectorXd&
     for (const Block& block : blocks) square += (block - mean).cwiseAbs2();
     const Block error = (square / (h * (h - 1))).cwiseSqrt();
     for (Index k = 0; k < kTogether; ++k) {
-        if (delta[k] > 0 && 2 * error.row(k).maxCoeff() > delta[k]) return false;
+        if (delta[k] > 0 && 2 * error.row(k).maxCoeff() > delta[k] / kFiner) return false;
     }
     return true;
 }

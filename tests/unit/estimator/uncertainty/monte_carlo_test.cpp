@@ -40,6 +40,50 @@ TEST(MonteCarlo, ConfirmsTheBudgetOfACleanRigToOneDigit) {
     EXPECT_LT(drawn.nonlinearity, 0.01);
 }
 
+/// The end that a share of `tail` lies beyond, of a normal variable and a rectangular one together.
+double end_of(double normal_u, double rectangular_u, double tail) {
+    const double half_width = std::sqrt(3.0) * rectangular_u;
+    double low = 0, high = 10 * (normal_u + rectangular_u);
+    while (high - low > 1e-9 * normal_u) {
+        const double end = 0.5 * (low + high);
+        constexpr int kParts = 1000;
+        double beyond = 0;
+        for (int k = 0; k < kParts; ++k) {
+            const double x = half_width * (2 * (k + 0.5) / kParts - 1);
+            beyond += 0.5 * std::erfc((end - x) / normal_u / std::sqrt(2.0)) / kParts;
+        }
+        (beyond > tail ? low : high) = end;
+    }
+    return low;
+}
+
+TEST(MonteCarlo, KnowsTheEndsToATenthOfWhatTheyAreHeldTo) {
+    // GIVEN squares and products, of which all but the gain is as good as normal, and ends far out
+    Settings settings;
+    settings.uncertainty.coverage = 0.99;
+    const Clean rig(settings);
+    const MonteCarloSettings how;
+    const MonteCarlo drawn = propagate_distributions(rig.settings, rig.result, rig.assessed, how);
+    EXPECT_TRUE(drawn.stable) << drawn.blocks;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        if (kind_of(i) < 2) continue;
+        const Coefficient& c = rig.assessed.coefficients[i];
+        const auto gain =
+            std::ranges::find(c.budget, std::string("accelerometer_gain"), &Contribution::input);
+        ASSERT_NE(gain, c.budget.end());
+        const double rectangular = gain->contribution;
+        const double end =
+            end_of(std::sqrt(c.u * c.u - rectangular * rectangular), rectangular, 0.005);
+        // THEN each end is where it is by that, within 4 standard errors of a tenth of the
+        // tolerance (JCGM 101, 8.2: twice the standard error within a fifth of it)
+        const double near = 4 * 0.1 * numerical_tolerance(c.u, how.digits);
+        EXPECT_NEAR(c.value - drawn.coefficients[i].low, end, near)
+            << "seed " << how.seed << ", " << drawn.blocks << " blocks, " << parameter_names()[i];
+        EXPECT_NEAR(drawn.coefficients[i].high - c.value, end, near)
+            << "seed " << how.seed << ", " << drawn.blocks << " blocks, " << parameter_names()[i];
+    }
+}
+
 TEST(MonteCarlo, FindsTheIntervalWhereARectangleDominates) {
     // GIVEN a gain that is known to 5 % only, rectangular: squares and products are all gain
     Settings settings;
