@@ -92,7 +92,8 @@ class CanPortSuite : public ::testing::TestWithParam<BusFactory> {
         bus_->join();
     }
 
-    /// Runs the io_context until `done`, a minute at most: waiting is long only where the test fails.
+    /// Runs the io_context until `done`, a minute at most: waiting is long only where the test
+    /// fails.
     bool run_until(const std::function<bool()>& done) {
         const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);
         while (!done() && std::chrono::steady_clock::now() < give_up) {
