@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -20,6 +21,16 @@ namespace {
 drivers::SweepSetPoint set_point_of(const estimator::SweptSine& sweep) {
     return {sweep.from_hz, sweep.to_hz,
             60 * std::abs(std::log2(sweep.to_hz / sweep.from_hz)) / sweep.seconds};
+}
+
+/// What a controller at random says of itself; of its reason it alone knows the number.
+std::string text_of(const drivers::RandomReading& reading) {
+    constexpr std::array kWords{"idle", "levelling", "at level", "aborted"};
+    const auto state = static_cast<std::size_t>(reading.state);
+    return fmt::format(
+        "random control {}{}, profile {} at {:g} dB", kWords.at(state),
+        reading.abort_reason == 0 ? "" : fmt::format(" (its reason {})", reading.abort_reason),
+        reading.random ? reading.profile : 0, reading.level_db);
 }
 
 }  // namespace
@@ -197,11 +208,7 @@ std::string Excitation::off_command(double table_g, Time now) {
         return fmt::format(
             "shaker off command: state {}, {}; expected profile {} at {:g} dB, at level",
             reading.state,
-            reading.random ? fmt::format("random control {}, profile {} at {:g} dB",
-                                         static_cast<int>(reading.random->state),
-                                         reading.random->random ? reading.random->profile : 0,
-                                         reading.random->level_db)
-                           : "no registers of random vibration",
+            reading.random ? text_of(*reading.random) : "no registers of random vibration",
             random_->set_point.profile, random_->set_point.level_db);
     return fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                        reading.state, reading.measured_g, table_g);

@@ -74,9 +74,14 @@ TrialLog::TrialLog(const std::string& folder, std::string by)
     : path_(in(folder)), by_(std::move(by)) {
     std::error_code error;  // whatever it is, the file then says it
     std::filesystem::create_directories(folder, error);
-    file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0644);
+    file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0644);
     if (file_ < 0) cannot(path_, "be written");
     ::fchmod(file_, 0644);  // the daemon is another user
+    // A line that a power cut has halved is not to take the next one with it.
+    char last = '\n';
+    if (const off_t size = ::lseek(file_, 0, SEEK_END); size > 0)
+        static_cast<void>(::pread(file_, &last, 1, size - 1) == 1);
+    if (last != '\n') static_cast<void>(::write(file_, "\n", 1) == 1);
     proto::sync_folder_of(path_);
 }
 

@@ -532,7 +532,8 @@ void Recorder::take(const Ended& ended) {
     head_.reset();
     shown_.recording = false;
     on_event_(lost_.lost > 0 ? Severity::warning : Severity::info,
-              fmt::format("{}: {} samples, {} frames, {} lost", shown_.file, shown_.samples,
+              fmt::format("{}: {} samples, {} frames, {} lost",
+                          shown_.file.empty() ? "no file" : shown_.file, shown_.samples,
                           shown_.frames, shown_.samples_lost + shown_.frames_lost));
 }
 

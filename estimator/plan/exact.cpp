@@ -141,9 +141,10 @@ Counts exact_design(const Problem& problem, std::size_t runs, const ExactSearch&
         if (search.done[i] > 0) ++done;
     }
     if (runs + done < problem.coefficients()) {
-        throw PlanError(
-            std::to_string(runs + done) + " runs for " + std::to_string(problem.coefficients()) +
-            " coefficients: " + std::to_string(problem.coefficients()) + " are needed at least");
+        const std::string needed = std::to_string(problem.coefficients());
+        throw PlanError(std::to_string(runs) + " runs" +
+                        (done > 0 ? " and " + std::to_string(done) + " points that are done" : "") +
+                        " for " + needed + " coefficients: " + needed + " are needed at least");
     }
     std::size_t starts = search.starts;
     if (starts == 0) {

@@ -64,7 +64,7 @@ Json survey_json(const Survey& of) {
     return {{"mount", of.hard ? "hard" : "isolated"},
             {"frequencies", std::move(lines)},
             {"coning_arcsec", kConingArcsec},
-            {"highest_hz", of.highest_hz},
+            {"highest_hz", of.highest_hz > 0 ? Json(of.highest_hz) : Json(nullptr)},
             {"smallest_share_seen", std::move(seen)},
             {"about", std::move(about)},
             {"profile", of.profile.empty() ? Json(nullptr) : Json(of.profile)},
@@ -94,7 +94,8 @@ std::string survey_text(const Survey& of) {
     if (of.smallest_seen.empty()) text += "  none, at one frequency";
     for (const auto& [hz, share] : of.smallest_seen)
         text += printed("  %.3g %% at %g Hz", 100 * share, hz);
-    text += printed("\na flat verdict reaches to %g Hz\n", of.highest_hz);
+    text += of.highest_hz > 0 ? printed("\na flat verdict reaches to %g Hz\n", of.highest_hz)
+                              : "\na flat verdict cannot come of these dwells\n";
     if (of.predicted_u_deg_h)
         text += printed("drift under %s: u %.4g deg/h, rms over resonances that may be\n",
                         of.profile.c_str(), *of.predicted_u_deg_h);

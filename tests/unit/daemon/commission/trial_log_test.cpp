@@ -60,6 +60,16 @@ TEST_F(Logged, WhatWasTriedIsThatOfTheseRegistersAndOfNoOthers) {
     EXPECT_THAT(tried.lacks(keys), HasSubstr("were not tried"));
 }
 
+TEST_F(Logged, ALineThatAPowerCutHasHalvedTakesNoOtherWithIt) {
+    std::filesystem::create_directories(folder);
+    std::ofstream(folder / "registers.jsonl") << R"({"what":"wri)";
+    TrialLog(folder.string(), "Ada").add("begin", TrialLog::Json::object());
+    const auto lines = TrialLog::take(folder.string());
+    ASSERT_EQ(lines.size(), 2U);
+    EXPECT_EQ(lines[0]["text"], R"({"what":"wri)");
+    EXPECT_EQ(lines[1]["what"], "begin");
+}
+
 TEST_F(Logged, AWriteIsKeptWithWhoWhenAddressOldAndNewValue) {
     {
         TrialLog log(folder.string(), "Ada");

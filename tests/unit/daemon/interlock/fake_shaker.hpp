@@ -78,7 +78,7 @@ class FakeShaker final : public drivers::Shaker {
                       wanted.amplitude_g,
                       now.running ? levelled : State::idle,
                       true,
-                      0};
+                      abort_reason};
     }
 
     /// Since when the newest set-point is there.
@@ -105,6 +105,7 @@ class FakeShaker final : public drivers::Shaker {
     drivers::Time since_ = 0;
     /// Of random vibration, once it runs.
     drivers::RandomReading::State levelled = drivers::RandomReading::State::at_level;
+    std::uint8_t abort_reason = 0;
 };
 
 }  // namespace vibrig

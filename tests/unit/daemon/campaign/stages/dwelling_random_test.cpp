@@ -114,9 +114,10 @@ TEST_F(RandomDwellTest, EndsWhereTheControllerAborts) {
     while (orders.size() < 2 && drivers::to_seconds(now) < 200) run_rig();
     ASSERT_EQ(orders.size(), 2U);
     shaker.levelled = RandomReading::State::aborted;
+    shaker.abort_reason = 2;
     run_for(2);
     EXPECT_EQ(status().state, CampaignState::aborted);
-    EXPECT_NE(status().reason.find("random control 3"), std::string::npos) << status().reason;
+    EXPECT_NE(status().reason.find("random control aborted (its reason 2), profile 4"), std::string::npos) << status().reason;
 }
 
 TEST_F(RandomDwellTest, IsNotWrittenWhileThePlatformMoves) {

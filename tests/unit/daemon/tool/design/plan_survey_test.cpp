@@ -111,6 +111,10 @@ TEST_F(SurveyCommand, TellsWhatMotionInStepMayDriftAtEachFrequency) {
     ASSERT_EQ(vibrig("plan --frequencies 15.1,65.1 --mount hard --order list"), 0);
     EXPECT_NE(out.find("dwells, coning 5.1e-05"), std::string::npos) << out;
     EXPECT_NE(out.find("turns by 2 arcsec in step"), std::string::npos) << out;
+    EXPECT_NE(out.find("a flat verdict "), std::string::npos) << out;
+    // Nothing contradicts a single frequency.
+    ASSERT_EQ(vibrig("plan --frequencies 15.1 --mount hard --order list"), 0) << error;
+    EXPECT_NE(out.find("a flat verdict cannot come of these"), std::string::npos) << out;
 }
 
 TEST_F(SurveyCommand, APlanForAProfileReachesItsHighestFrequencyOrSaysSo) {
