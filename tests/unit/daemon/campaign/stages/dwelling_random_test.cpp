@@ -117,7 +117,9 @@ TEST_F(RandomDwellTest, EndsWhereTheControllerAborts) {
     shaker.abort_reason = 2;
     run_for(2);
     EXPECT_EQ(status().state, CampaignState::aborted);
-    EXPECT_NE(status().reason.find("random control aborted (its reason 2), profile 4"), std::string::npos) << status().reason;
+    EXPECT_NE(status().reason.find("random control aborted (its reason 2), profile 4"),
+              std::string::npos)
+        << status().reason;
 }
 
 TEST_F(RandomDwellTest, IsNotWrittenWhileThePlatformMoves) {
