@@ -50,7 +50,7 @@ def campaign_of(given, checks):
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"].get("rest") == "at rest" and
                          s["platform"].get("ready"), 60)
             said = [rig.tool(command, "--by", "tester").stderr for command in ("arm", "start")]
-            end, status = time.monotonic() + (3000 if given.soak else 500), None
+            end, status = time.monotonic() + (3000 if given.soak else 1500), None
             while time.monotonic() < end:
                 status = rig.status()
                 if status is None or status["campaign"]["state"] in ("finished", "aborted", "tripped", "idle"):
