@@ -40,8 +40,9 @@ class DwellKinds {
     /// frequency or the profile changes within it, and where a profile is not known.
     void add(const std::vector<const proto::RecordingRow*>& rows,
              const std::vector<std::string>& profiles, const std::string& file);
-    /// Once all dwells are there. Throws where the spectra list one that the recording has not: it
-    /// is a slip, and the dwell that was meant has the configuration's frequency.
+    /// Once it is known which dwells are at rest. Throws where the spectra list one that the
+    /// recording has not while one that shook is not listed: it may be the one that was meant, and
+    /// has the configuration's frequency. Of a recording that was cut short all are listed.
     void expect_listed(const std::string& file) const;
     [[nodiscard]] const std::vector<estimator::spectrum::Kind>& kinds() const { return kinds_; }
     /// None: at rest, by what the recording says.

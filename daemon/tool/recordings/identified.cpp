@@ -414,7 +414,6 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     auto sweeps = take_sweeps(dwells, settings, file);
     DwellKinds kinds(rig, request.spectra);
     for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
-    kinds.expect_listed(file);
     std::vector<std::size_t> set_points_at_rest;
     while (true) {
         expect_sine(kinds, request, file);
@@ -425,6 +424,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
         refuse_unseen(kinds, settings, file);
         DwellsIdentified identified(dwells, kinds, settings, file);
         if (identified.resting().empty()) {
+            kinds.expect_listed(file);
             Found found = identified.found(request.held_out);
             found.shaken.sweeps = std::move(sweeps);
             warn_of_rest(dwells, set_points_at_rest, found.result);

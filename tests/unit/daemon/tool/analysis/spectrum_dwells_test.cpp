@@ -107,6 +107,20 @@ TEST_F(Predict, SpectraListDwellsThatTheRecordingHas) {
     refused(good + R"({"run": 1, "position": 2, "profile": "truck", "leveldb": -3})",
             "spectra.json: [1].leveldb: found an unknown key, expected a known one, perhaps "
             "level_db");
+    // Of a recording that was cut short the plan's whole list will do: the dwells at 0 g stand in
+    // none.
+    std::string all;
+    for (int position = 1; position <= 14; ++position)
+        all +=
+            R"({"run": 1, "position": )" + std::to_string(position) + R"(, "lines": [[15, 6]]}, )";
+    const auto identified = [&](const std::string& more) {
+        write("spectra.json", "[" + all + more + "]");
+        return run("identify plain.csv --spectra spectra.json --json");
+    };
+    const Ended cut_short = identified(R"({"run": 3, "position": 1, "lines": [[15, 6]]})");
+    ASSERT_NE(cut_short.exit_code, 2) << cut_short.error;
+    EXPECT_EQ(cut_short.json(),
+              identified(R"({"run": 1, "position": 15, "lines": [[15, 6]]})").json());
 }
 
 }  // namespace
