@@ -25,6 +25,9 @@ class Commissioned : public ::testing::Test {
   protected:
     void rig_of(std::uint64_t seed) {
         rig = std::make_unique<UnknownRig>(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
         // A reading near its zero may wrap within a second's mean, here as on a rig.
         procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, wired, wired);
     }

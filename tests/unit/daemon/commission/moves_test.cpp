@@ -202,9 +202,6 @@ TEST_F(Commissioned, ASoftStopIsReportedWithItsGimbalAndATravelWithinItIsScaledI
         SCOPED_TRACE("seed " + std::to_string(seed));
         // Says that it is in position where its stop is.
         rig_of(seed);
-        based = false;
-        travel = {};
-        drifting_since = 0;
         const std::size_t short_one = seed % 3;
         rig->travel_deg = {140, 35, 178};
         rig->travel_deg[short_one] = short_one == 1 ? 18 : 60;
@@ -243,9 +240,7 @@ TEST_F(Commissioned, ASoftStopIsReportedWithItsGimbalAndATravelWithinItIsScaledI
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
-        based = false;
-        travel = most_travel = {};
-        drifting_since = 0;
+        most_travel = {};
         rig->travel_deg = {60, 20, 70};
         answers["travel"] = "-60 60 -20 20 -70 70";
         const Json result = run()["result"];
@@ -267,9 +262,6 @@ TEST_F(Commissioned, TheTravelThatIsFoundIsOneThatTheConfigurationTakes) {
     for (std::uint64_t seed = 1; seed <= 12; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
-        based = false;
-        travel = {};
-        drifting_since = 0;
         const auto start = rig->reading_at(rig->angle_deg());
         const Json result = run()["result"];
         if (result["outcome"] != "decided") continue;

@@ -98,9 +98,6 @@ TEST_F(Commissioned, RandomRigsAreNamedRightOrNotAtAll) {
     for (std::uint64_t seed = 1; seed <= kRigs; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
-        based = false;
-        travel = {};
-        drifting_since = 0;
         const Time began = now;
         const Json state = run();
         minutes = std::max(minutes, static_cast<int>((now - began) / (60 * kSecond)));
@@ -135,8 +132,6 @@ TEST_F(Commissioned, ByHandNothingIsCommanded) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
         rig->by_hand = true;
-        travel = {};
-        drifting_since = 0;
         const Json state = run(true);
         ASSERT_EQ(state["result"]["outcome"], "decided") << state["result"].dump(1);
         expect_right(*rig, state["result"], false);
@@ -228,9 +223,6 @@ TEST_F(Commissioned, ALatitudeOfTheOtherHemisphereIsNotBelieved) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
         if (std::abs(rig->truth.latitude_deg) < 10) continue;  // nothing tells it there
-        based = false;
-        travel = {};
-        drifting_since = 0;
         // The compass is right, and with drawing and sense it is three against one.
         answers["latitude"] = std::to_string(-rig->truth.latitude_deg);
         const Json result = run()["result"];

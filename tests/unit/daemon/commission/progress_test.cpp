@@ -43,9 +43,6 @@ class Resumed : public Commissioned {
 
     void rig_again(std::uint64_t seed) {
         rig_of(seed);
-        based = false;
-        travel = {};
-        drifting_since = 0;
         kept = Json::array();
         asked.clear();
         beyond = {};

@@ -22,9 +22,7 @@ class Torqued : public Commissioned {
     void torqued_by(std::uint64_t seed, const Eigen::Matrix3d& response) {
         torquers = response;
         rig_of(seed);
-        based = false;
-        travel = torque = {};
-        drifting_since = 0;
+        torque = {};
         most_torque = 0;
         asked.clear();
     }
