@@ -115,6 +115,12 @@ void ControlLoop::take_over() {
         log(Severity::warning, "journal", "the newest loop check was out of band: " + found);
     }
     book_.expect_signed(journal_->recovery().signed_parts);
+    if (const auto& by = journal_->recovery().torqued_by; !by.empty() && parts_.torquer) {
+        campaign_.take_over_torque();
+        log(Severity::warning, "journal",
+            "the daemon ended while " + by +
+                " let it torque the platform (vibrig commission): zero is commanded");
+    }
     std::vector<campaign::ProofRecord> proofs;
     for (const auto& text : journal_->recovery().proofs) {
         std::string why;

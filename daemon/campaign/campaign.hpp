@@ -75,6 +75,9 @@ class Campaign {
     void take_over_proofs(std::vector<ProofRecord> history);
     /// Before the first step(): what an earlier life has left latched, in words.
     void take_over_trip(const std::string& causes, double table_g = 0);
+    /// Before the first step(): what an earlier life may have left torqued. It is ended, and no
+    /// torque is heeded but this one's own, until it is commissioned again.
+    void take_over_torque();
     /// The next proof goes up from 0.03 g, each rung held against the command before the next:
     /// nobody has seen yet what this shaker makes of a number.
     void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
@@ -342,7 +345,8 @@ class Campaign {
     bool opened_ = false;  ///< likewise, the opening check
     RestCheckStatus rest_check_;
     drivers::Time torque_sent_ = 0;
-    std::string mark_;  ///< why the campaign is marked
+    bool torque_left_ = false;  ///< by an earlier life, while it commissioned
+    std::string mark_;          ///< why the campaign is marked
     /// Run, and variance of the relative level, of each dwell in which zeros were in force.
     std::vector<std::pair<int, double>> level_variances_;
 };

@@ -84,6 +84,12 @@ void Campaign::take_over_trip(const std::string& causes, double table_g) {
     stop_.excited(table_g);
 }
 
+void Campaign::take_over_torque() {
+    if (ports_.rig.torquer == nullptr) return;
+    ports_.rig.torquer->doubt();
+    torque_left_ = true;
+}
+
 std::string Campaign::not_fit_to_arm(Time now) const {
     if (active() && !paused_disarmed()) return "a campaign is running";
     if (state_ == State::checking) return check_under_way();
@@ -104,6 +110,7 @@ std::string Campaign::begin_commissioning(const std::string& by, Time now) {
     if (auto why = may_slew(ports_.rig, stop_); !why.empty()) return why;
     ports_.rig.gimbal.forget_position();
     reason_ = by;
+    torque_left_ = false;
     enter(State::commissioning, now);
     return {};
 }

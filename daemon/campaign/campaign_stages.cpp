@@ -56,7 +56,7 @@ void Campaign::leave_stage() {
 void Campaign::insist_on_zero_torque(Time now) {
     // Levelling torques by itself, and so does what is commissioned.
     if (ports_.rig.torquer == nullptr || state_ == State::levelling || commissioning()) return;
-    const bool ours = active() || state_ == State::tripped;
+    const bool ours = active() || state_ == State::tripped || torque_left_;
     if (ports_.rig.torquer->zero() && !(ours && torquing(ports_.rig))) return;
     if (now - torque_sent_ < kStagePoll) return;
     torque_sent_ = now;

@@ -50,6 +50,7 @@ struct Recovery {
     std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
     /// Parts of the commissioning record, and who has signed each since it was recorded last.
     std::vector<std::pair<std::string, std::string>> signed_parts;
+    std::string torqued_by;  ///< whose commissioning may have left a torque; empty: nobody's
     std::vector<std::string> certificates;  ///< numbers of those that were issued
     /// Not acknowledged; kDiedArmed among them if an arming had no end.
     std::vector<Latch> latches;
@@ -155,6 +156,7 @@ class Journal {
     void recover_proofs();
     void recover_certificates();
     void recover_signed_parts();
+    void recover_torque();
     void recover_safety();
     void read_safety(Database& from);
     void follow(const Safety& safety);

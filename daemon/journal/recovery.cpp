@@ -19,6 +19,7 @@ void Journal::recover() {
     recover_proofs();
     recover_certificates();
     recover_signed_parts();
+    recover_torque();
     recover_safety();
     const auto found = database().ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
@@ -57,6 +58,18 @@ void Journal::recover_signed_parts() {
                         "part = s.part), "
                         "0) ORDER BY id"))
         recovery_.signed_parts.emplace_back(row.texts.at(0), row.texts.at(1));
+}
+
+/// Nothing is armed for commissioning's torques. From their permission on, which is on disk long
+/// before the first of them is commanded, one may be left; until zero was, or it came to its end.
+void Journal::recover_torque() {
+    const auto newest = database().ask(
+        "SELECT by, what = 'permission' OR EXISTS (SELECT 1 FROM json_each(data_json, "
+        "'$.deg_per_h') WHERE value <> 0) FROM commissioning WHERE what IN ('torque', 'verdict') "
+        "OR (what = 'permission' AND json_extract(data_json, '$.id') = 'permit.torque' AND "
+        "json_extract(data_json, '$.value') = 'yes') ORDER BY id DESC LIMIT 1");
+    if (!newest.empty() && newest.front().numbers.at(1) != 0)
+        recovery_.torqued_by = newest.front().texts.at(0);
 }
 
 void Journal::recover_certificates() {

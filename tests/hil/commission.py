@@ -1113,6 +1113,53 @@ class Hand:
         self.line.close()
 
 
+class Torque(Hand):
+    """Whether the platform says that it is torqued."""
+
+    def __init__(self, path):
+        self.torquing = None
+        super().__init__(path)
+
+    def listen(self):
+        try:
+            while frame := self.line.recv(256):
+                if struct.unpack_from("<I", frame)[0] == 0x210:
+                    self.torquing = bool(frame[8] & 4)
+        except OSError:
+            pass
+
+    def becomes(self, torquing, timeout_s):
+        end = time.monotonic() + timeout_s
+        while self.torquing != torquing and time.monotonic() < end:
+            time.sleep(0.002)
+        return self.torquing == torquing
+
+
+def killed_while_torqued(checks, programs, folder):
+    """SIGKILL under a torque: nothing was armed, and the next daemon ends it all the same."""
+    u = Unknown(checks, programs, folder, drawn(5), speed="40")
+    platform = Torque(u.rig.path)
+    try:
+        argv = ["commission", "--by", "Ada", "--answers", u.answers(**{"permit.resume": "yes"}), "--socket", u.rig.socket]
+        tool = r.Child("vibrig", [u.rig.program("vibrig"), *argv], folder)
+        if not checks.check(platform.becomes(True, 120), "commissioning torques the platform", tool.text() + u.rig.logs()):
+            return
+        u.rig.daemon.end(signal.SIGKILL)
+        time.sleep(1)
+        checks.equal(platform.torquing, True, "a daemon that is killed leaves it torqued")
+        ended(tool)
+        ready = u.start()
+        checks.check(platform.becomes(False, 10) and r.state_of(ready) == "idle", "the next one ends that, and nobody has to acknowledge it", u.rig.logs())
+        checks.check(u.rig.daemon.says("let it torque the platform (vibrig commission): zero is commanded"), "and says why", u.rig.logs())
+        run = u.rig.tool(*argv[:-2], "--resume", "--json", timeout=300)
+        checks.check(run.returncode == 0 and platform.becomes(False, 10), "commissioning goes on to its end", run.stdout + run.stderr + u.rig.logs())
+        u.restart()
+        checks.equal(u.rig.daemon.text().count("zero is commanded"), 1, "and is no reason any more")
+    finally:
+        platform.close()
+        u.rig.stop()
+
+
 def named_by_hand(checks, rig, dbc, folder):
     """Each gimbal is turned in turn: its angle, accelerometers, counter and rate go into found.toml, and by two persons into a configuration."""
     stands = [10.0, 5.0, 20.0]
@@ -1241,7 +1288,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs, "--soak" in sys.argv)
-    for one in (nothing_is_written, few_bits, lying_clock):
+    for one in (killed_while_torqued, nothing_is_written, few_bits, lying_clock):
         with tempfile.TemporaryDirectory() as folder:
             one(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:

@@ -333,6 +333,29 @@ TEST_F(StagesTest, EndsTheTorqueOfADaemonThatDiedArmed) {
     EXPECT_EQ(torque, (std::array<double, 3>{60, 0, 0}));
 }
 
+/// Killed while it was commissioned: nothing was armed, and nothing is latched.
+TEST_F(StagesTest, EndsTheTorqueOfADaemonThatDiedWhileItWasCommissioned) {
+    make();
+    torque = {0, 60, 0};
+    campaign->take_over_torque();
+    tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    EXPECT_EQ(status().state, CampaignState::idle) << "nobody has to acknowledge it";
+    // WHEN the platform did not hear it, it is said again
+    torque = {0, 60, 0};
+    for (int i = 0; i < 10; ++i) tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    // THEN not once it is commissioned again, with torques of its own
+    for (int i = 0; i < 1000 && campaign->begin_commissioning("Ada", now) != ""; ++i) tick();
+    ASSERT_TRUE(campaign->commissioning());
+    torque = {0, 60, 0};
+    for (int i = 0; i < 10; ++i) tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{0, 60, 0}));
+    campaign->end_commissioning(now);
+    for (int i = 0; i < 10; ++i) tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{0, 60, 0})) << "whoever did that";
+}
+
 TEST_F(StagesTest, AbortsWithOneClearReasonWhenAStageCannotGoOn) {
     settings.levelling = true;
     begin();

@@ -3,7 +3,9 @@
 
 #include <cmath>
 
+#include "daemon/journal/journal.hpp"
 #include "tests/unit/daemon/commission/commissioned.hpp"
+#include "tests/unit/support/temporary_folder.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -25,6 +27,20 @@ class Torqued : public Commissioned {
         torque = {};
         most_torque = 0;
         asked.clear();
+    }
+    /// Whose torque the next daemon ends, where the journal has this one's notes up to `count`.
+    [[nodiscard]] std::string torqued_by(std::size_t count) const {
+        const TemporaryFolder folder;
+        const std::string path = (folder / "journal.sqlite3").string();
+        {
+            journal::Journal journal(path, 1);
+            journal.start();
+            for (std::size_t n = 0; n < count; ++n)
+                journal.commissioned({notes[n].part, notes[n].step, notes[n].by, "uid 0",
+                                      notes[n].what, notes[n].data.dump(), 9});
+            journal.stop();
+        }
+        return journal::Journal(path, 1).recovery().torqued_by;
     }
     /// Up to where it drifts under the first torque.
     void to_the_first_torque() {
@@ -227,6 +243,41 @@ TEST_F(Torqued, AChannelThatIsSilentIsNoTorque) {
     pass(0.2);
     EXPECT_EQ(question(), "go_on");
     EXPECT_EQ(torque, Vec3{});
+}
+
+/// Killed, a daemon leaves the platform torqued; the next one ends that, from what is on disk.
+TEST_F(Torqued, TheNextDaemonEndsWhatOneThatDiedMayHaveLeft) {
+    torqued_rig(3, {1, -1, 1});
+    answers["names"] = "torquers";
+    // GIVEN a rig of which nobody has permitted torques yet: nothing is sent
+    to_the_first_torque();
+    const auto permission = std::ranges::find_if(notes, [](const Note& note) {
+        return note.what == "permission" && note.data.value("id", "") == "permit.torque";
+    });
+    const auto before = static_cast<std::size_t>(permission - notes.begin());
+    EXPECT_EQ(torqued_by(before), "");
+    // WHEN it dies from then on, at the first torque too, of which the journal has no row yet
+    EXPECT_EQ(torqued_by(before + 1), "Ada");
+    EXPECT_EQ(torqued_by(notes.size() - 1), "Ada");
+    // at any later one, and while it is stopped and may go on
+    EXPECT_EQ(torqued_by(notes.size()), "Ada");
+    pass(2.3, "");
+    ASSERT_EQ(question(), "go_on");
+    EXPECT_EQ(torqued_by(notes.size()), "Ada");
+    run_until([this] { return torque[2] < 0; });
+    EXPECT_EQ(torqued_by(notes.size()), "Ada");
+    // THEN not once zero was commanded, nor after the end
+    run_until([this] { return torque == Vec3{}; });
+    EXPECT_EQ(torqued_by(notes.size()), "");
+    ASSERT_EQ(run()["result"]["outcome"], "decided");
+    EXPECT_EQ(torqued_by(notes.size()), "");
+    // AND not of one that a person ended while it was torqued
+    torqued_rig(3, {1, -1, 1});
+    notes.clear();
+    to_the_first_torque();
+    procedure->halt("ended by Ada", now);
+    EXPECT_EQ(torque, Vec3{});
+    EXPECT_EQ(torqued_by(notes.size()), "");
 }
 
 TEST_F(Torqued, AfterTheDaemonsEndNothingIsTorquedBeforeANewPermission) {
