@@ -17,6 +17,7 @@
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zero_calibration.hpp"
 #include "daemon/serve/socket_file.hpp"
+#include "daemon/serve/status_server.hpp"
 #include "daemon/serve/tls.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
@@ -53,6 +54,64 @@ void check_zeroing_travel(const configuration::Configuration& c) {
                     at[i], std::array{"outer", "inner", "azimuth"}[i], low, high));
             }
         }
+    }
+}
+
+/// Whether a file, if there is one stated, can be read by whoever runs this; false: by others
+/// alone. Throws ConfigurationError where it cannot be by anybody.
+bool readable(const configuration::Loaded& loaded, const std::string& key, const std::string& file,
+              const char* expected) {
+    if (file.empty() || ::access(file.c_str(), R_OK) == 0) return true;
+    if (errno == EACCES) return false;
+    throw configuration::ConfigurationError(place_of(loaded, key) + key + ": found \"" + file +
+                                            "\", expected " + expected + ": " +
+                                            std::strerror(errno));
+}
+
+void check_certificates(const configuration::Loaded& loaded) {
+    const auto& server = loaded.configuration.server;
+    if (server.remote.empty()) return;
+    for (const auto& [key, file] : {std::pair("server.certificate", server.certificate),
+                                    {"server.key", server.key},
+                                    {"server.clients_ca", server.clients_ca},
+                                    {"server.revoked", server.revoked}})
+        if (!readable(loaded, key, file, "a PEM file")) return;
+    try {
+        (void)serve::mutual_tls(server.certificate, server.key, server.clients_ca, true,
+                                server.revoked);
+    } catch (const serve::ServeError& error) {
+        throw configuration::ConfigurationError(place_of(loaded, "server.remote") +
+                                                "server.remote: " + error.what());
+    }
+}
+
+void check_broker_files(const configuration::Loaded& loaded) {
+    const auto& mqtt = loaded.configuration.mqtt;
+    if (mqtt.host.empty()) return;
+    for (const auto& [key, file] : {std::pair("mqtt.ca", mqtt.ca),
+                                    {"mqtt.certificate", mqtt.certificate},
+                                    {"mqtt.key", mqtt.key},
+                                    {"mqtt.password_file", mqtt.password_file}})
+        (void)readable(loaded, key, file, "a file that can be read");
+}
+
+/// The start makes these, but no folder for them other than that of the results.
+void check_made_files(const configuration::Loaded& loaded) {
+    const auto& c = loaded.configuration;
+    // With the end that only a folder may have.
+    const auto folder = [](const std::filesystem::path& path) {
+        return std::filesystem::absolute(path).lexically_normal() / "";
+    };
+    for (const auto& [key, file] :
+         {std::pair("journal.file", c.journal), {"log.file", c.log_file}}) {
+        if (file.empty()) continue;
+        const auto parent = folder(std::filesystem::absolute(file).parent_path());
+        if ((!c.results.empty() && parent == folder(c.results)) ||
+            ::access(parent.c_str(), W_OK | X_OK) == 0 || errno == EACCES)
+            continue;
+        throw configuration::ConfigurationError(
+            place_of(loaded, key) + key + ": found \"" + file +
+            "\", expected a file in a folder that is there: " + std::strerror(errno));
     }
 }
 
@@ -120,25 +179,18 @@ void check_results(const configuration::Loaded& loaded) {
                                             "\", expected a folder that can be written: " + why);
 }
 
-void check_certificates(const configuration::Loaded& loaded) {
-    const auto& server = loaded.configuration.server;
-    if (server.remote.empty()) return;
-    for (const auto& [key, file] : {std::pair("server.certificate", server.certificate),
-                                    {"server.key", server.key},
-                                    {"server.clients_ca", server.clients_ca},
-                                    {"server.revoked", server.revoked}}) {
-        if (file.empty() || ::access(file.c_str(), R_OK) == 0) continue;
-        if (errno == EACCES) return;
-        throw configuration::ConfigurationError(place_of(loaded, key) + key + ": found \"" + file +
-                                                "\", expected a PEM file: " + std::strerror(errno));
+void check_named(const configuration::Loaded& loaded) {
+    if (const auto& group = loaded.configuration.server.operator_group; !group.empty()) {
+        try {
+            (void)serve::group_named(group);
+        } catch (const serve::ServeError& error) {
+            throw configuration::ConfigurationError(place_of(loaded, "server.operator_group") +
+                                                    error.what());
+        }
     }
-    try {
-        (void)serve::mutual_tls(server.certificate, server.key, server.clients_ca, true,
-                                server.revoked);
-    } catch (const serve::ServeError& error) {
-        throw configuration::ConfigurationError(place_of(loaded, "server.remote") +
-                                                "server.remote: " + error.what());
-    }
+    check_certificates(loaded);
+    check_broker_files(loaded);
+    check_made_files(loaded);
 }
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {

@@ -66,7 +66,7 @@ void check_again(const std::string& path) {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_bindings(loaded);
         vibrig::check_results(loaded);
-        vibrig::check_certificates(loaded);
+        vibrig::check_named(loaded);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -296,7 +296,7 @@ int main(int argc, char** argv) {
             return vibrig::proto::print_status(app);
         }
         auto loaded = vibrig::configuration::load(path, true);
-        vibrig::check_certificates(loaded);
+        vibrig::check_named(loaded);
         if (check) {
             print_check(loaded);
             return vibrig::proto::print_status(app);

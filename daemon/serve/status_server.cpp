@@ -66,13 +66,6 @@ std::string random_instance() {
     return text.data();
 }
 
-gid_t group_named(const std::string& name) {
-    const group* const found = ::getgrnam(name.c_str());
-    if (found == nullptr)
-        throw ServeError("server.operator_group: found '" + name + "', expected a group's name");
-    return found->gr_gid;
-}
-
 bool is_member(uid_t uid, gid_t wanted) {
     const passwd* const user = ::getpwuid(uid);
     if (user == nullptr) return false;
@@ -84,6 +77,14 @@ bool is_member(uid_t uid, gid_t wanted) {
 }
 
 }  // namespace
+
+gid_t group_named(const std::string& name) {
+    const group* const found = ::getgrnam(name.c_str());
+    if (found == nullptr)
+        throw ServeError("server.operator_group: found \"" + name +
+                         "\", expected a group of this machine");
+    return found->gr_gid;
+}
 
 struct StatusServer::Impl {
     enum class Door : std::uint8_t { control, status, page, remote };

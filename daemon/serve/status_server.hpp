@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -34,6 +36,9 @@ struct ServerSettings {
     ServerLimits limits = {};
     Documents documents = {};  ///< all there is to be read; empty: the daemon's own API and page
 };
+
+/// Of `server.operator_group`. Throws ServeError where this machine has no such group.
+[[nodiscard]] gid_t group_named(const std::string& name);
 
 /// HTTP/1.1 and WebSocket on a thread of its own: it asks the StatusSource, and nothing waits for
 /// it.

@@ -175,7 +175,7 @@ def refused(checks, programs, folder):
 
 def unwritable(checks, programs, folder):
     """What only the start would show is found before: results that cannot be kept (root is stopped by no permission) and
-    certificates that are not there or are none."""
+    certificates that are not there or are none; a group, a broker's files and folders that this machine does not have."""
     path, nowhere = os.path.join(folder, "unwritable.toml"), os.path.join(folder, "file")
     with open(nowhere, "w", encoding="utf-8"):
         pass
@@ -192,6 +192,28 @@ def unwritable(checks, programs, folder):
         check = checked(server=server)
         checks.check(check.returncode == 2 and expected in check.stderr, "--check finds certificates that are not there or are none",
                      check.stderr)
+    for tables, expected in (({"server": {"operator_group": "no-such-group"}}, 'server.operator_group: found "no-such-group", expected a group of this machine'),
+                             ({"mqtt": {"host": "localhost", "ca": "gone.crt"}}, f'mqtt.ca: found "{folder}/gone.crt", expected a file that can be read: No such file'),
+                             ({"mqtt": {"host": "localhost", "username": "rig", "password_file": "gone.txt"}},
+                              f'mqtt.password_file: found "{folder}/gone.txt", expected a file that can be read: No such file'),
+                             ({"journal": {"file": "gone/j.sqlite3"}}, f'journal.file: found "{folder}/gone/j.sqlite3", expected a file in a folder that is there'),
+                             ({"log": {"file": f"{nowhere}/rig.log"}}, f'log.file: found "{nowhere}/rig.log", expected a file in a folder that is there: Not a dir')):
+        check = checked(**tables)
+        key = expected.partition(":")[0]
+        checks.check(check.returncode == 2 and f"{path}:" in check.stderr and expected in check.stderr, f"--check finds what {key} names and this machine has not",
+                     check.stderr)
+        started = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path], capture_output=True, text=True, timeout=30)
+        checks.equal((started.returncode, started.stderr), (2, check.stderr), f"{key}: and the start the same")
+    made = os.path.join(folder, "made")
+    check = checked(campaign={"results": made}, journal={"file": os.path.join(made, "journal.sqlite3")})
+    checks.equal((check.returncode, os.path.exists(made)), (0, False), "--check knows that the start makes the folder of the results")
+    with open(path, encoding="utf-8") as file:
+        beside = file.read().replace(f'"{made}/journal.sqlite3"', '"journal.sqlite3"')
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(beside)
+    check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", "unwritable.toml", "--check"], capture_output=True, text=True, timeout=30,
+                           cwd=folder)
+    checks.equal((check.returncode, check.stderr), (0, ""), "--check takes files beside the configuration, from wherever")
     # A DBC of another rig: all that it does not have in one run, each with the line where it is mended.
     dbc = os.path.join(folder, "another.dbc")
     text = subprocess.run([os.path.join(programs, "vibrigd"), "--print-dbc"], capture_output=True, text=True, check=True).stdout
