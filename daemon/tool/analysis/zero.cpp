@@ -104,7 +104,7 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
         json["gravity_mps2"] = s.site.gravity_mps2;
         json["gravity_assumed"] = gravity_assumed;
         if (apart) {
-            json["apart"] = apart_json(*apart);
+            json["apart"] = apart_json(*apart, result.valid);
         }
         std::cout << proto::json_text(json) << '\n';
     } else {
@@ -121,7 +121,7 @@ int report(const Options& options, const std::vector<zeros::Calibration>& runs) 
                 s.site.gravity_mps2, kAxisLetters[static_cast<std::size_t>(result.upright)],
                 1e-3 * s.site.gravity_mps2);
         if (apart) {
-            std::cout << apart_table(*apart);
+            std::cout << apart_table(*apart, result.valid);
         }
     }
     return result.valid ? 0 : kNo;

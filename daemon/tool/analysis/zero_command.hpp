@@ -32,8 +32,9 @@ void check_increments(const std::string& file, const std::array<ColumnFile, 6>& 
 [[nodiscard]] Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& seen);
 [[nodiscard]] std::string result_table(const zeros::CalibrationResult& r,
                                        const zeros::Observability& seen);
-/// Zeros and misalignments separated by several calibrations together.
-[[nodiscard]] Json apart_json(const zeros::ZerosApart& apart);
-[[nodiscard]] std::string apart_table(const zeros::ZerosApart& apart);
+/// Zeros and misalignments separated by several calibrations together; where one of them is not
+/// valid there are none, null in JSON.
+[[nodiscard]] Json apart_json(const zeros::ZerosApart& apart, bool valid);
+[[nodiscard]] std::string apart_table(const zeros::ZerosApart& apart, bool valid);
 
 }  // namespace vibrig::tool::zero_command

@@ -126,26 +126,28 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
     return out;
 }
 
-Json apart_json(const zeros::ZerosApart& apart) {
+Json apart_json(const zeros::ZerosApart& apart, bool valid) {
+    const auto known = [valid](double value) { return valid ? Json(value) : Json(nullptr); };
     Json json = Json::array();
     for (std::size_t i = 0; i < 3; ++i) {
         Json axis{{"axis", kAxisLetters[i]},
                   {"what", "zero"},
-                  {"observable", true},
-                  {"zero_mg", apart.zero_mg[i]},
-                  {"sigma_mg", std::sqrt(apart.covariance_mg2[i][i])}};
+                  {"observable", valid},
+                  {"zero_mg", known(apart.zero_mg[i])},
+                  {"sigma_mg", known(std::sqrt(apart.covariance_mg2[i][i]))}};
         for (std::size_t k = 0; k < 3; ++k) {
             if (apart.share_sigma[i][k] <= 0) continue;
             const Share share = share_of(i, k);
-            axis[share.key] = apart.share[i][k] / share.unit;
-            axis[share.key + "_sigma"] = apart.share_sigma[i][k] / share.unit;
+            axis[share.key] = known(apart.share[i][k] / share.unit);
+            axis[share.key + "_sigma"] = known(apart.share_sigma[i][k] / share.unit);
         }
         json.push_back(std::move(axis));
     }
     return json;
 }
 
-std::string apart_table(const zeros::ZerosApart& apart) {
+std::string apart_table(const zeros::ZerosApart& apart, bool valid) {
+    if (!valid) return "zeros apart from misalignment and scale: none, not every run is valid\n";
     std::string out = "zeros apart from misalignment and scale\n";
     for (std::size_t i = 0; i < 3; ++i) {
         out += printed("%-4s zero %.5f +- %.5f mg", kAxisLetters[i], apart.zero_mg[i],

@@ -125,6 +125,23 @@ TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {
                        "zero` is too much)"),
               std::string::npos)
         << out;
+    // with nothing told apart: those numbers would be none of this unit
+    EXPECT_NE(out.find("zeros apart from misalignment and scale: none, not every run is valid"),
+              std::string::npos)
+        << out;
+    EXPECT_EQ(out.find(" +- "), std::string::npos) << out;
+    const Json wrong = json("zero up.csv --down up.csv", 1);
+    EXPECT_EQ(wrong["apart"].size(), 3U);
+    for (const Json& axis : wrong["apart"]) {
+        EXPECT_EQ(axis["observable"], false);
+        const bool z = axis["axis"] == "z";
+        for (const std::string key :
+             {"zero_mg", "sigma_mg", z ? "scale_ppm" : "misalignment_arcsec",
+              z ? "scale_ppm_sigma" : "misalignment_arcsec_sigma"}) {
+            ASSERT_TRUE(axis.contains(key)) << key;
+            EXPECT_TRUE(axis[key].is_null()) << key;
+        }
+    }
     EXPECT_EQ(vibrig("zero down.csv"), 1) << out;
     EXPECT_NE(out.find("stands with z down, expected up (the wrong file, or --inverted of `vibrig "
                        "zero` is missing)"),
