@@ -141,6 +141,32 @@ def killed_and_resumed(checks, programs, folder):
         rig.stop()
 
 
+def ended_in_order(checks, programs, folder):
+    """SIGTERM, as the service manager's stop, is an abort: the campaign is over, as docs/operating.md says."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    try:
+        rig.start_plant("--seed", "3", "--speed", "20")
+        rig.configure(CAMPAIGN)
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 60)
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "Ada")
+        rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
+        checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 0, "stopped in a dwell: vibrigd ends in order")
+        with sqlite3.connect(f"file:{journal(rig)}?mode=ro", uri=True) as database:
+            checks.equal(database.execute("SELECT state, reason FROM campaign").fetchall(), [("aborted", "the daemon is shutting down")],
+                         "stopped in a dwell: the campaign is aborted, and why")
+        checks.check(os.path.exists(os.path.join(rig.results, "result-partial.json")), "stopped in a dwell: there is a partial result")
+        status = restart(checks, rig, "stopped in a dwell")
+        checks.equal((status["campaign"]["state"], status["campaign"].get("resume_offer", "")), ("idle", ""),
+                     "stopped in a dwell: nothing is latched, and nothing is offered")
+        rig.arm("Grace")
+        refused = rig.tool("resume", "--by", "Grace")
+        checks.check(refused.returncode == 1 and "not paused" in refused.stderr, "stopped in a dwell: there is nothing to resume", refused.stderr)
+    finally:
+        rig.stop()
+
+
 def noise_in_force(status):
     return [gyro["in_force_deg_per_rt_h"] for gyro in status["noise"]["gyros"]]
 
@@ -262,7 +288,7 @@ def not_used(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (killed_and_resumed, noise_goes_on, not_used):
+    for part in (killed_and_resumed, ended_in_order, noise_goes_on, not_used):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()
