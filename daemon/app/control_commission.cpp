@@ -2,6 +2,7 @@
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/bus_bits.hpp"
 #include "proto/json_text.hpp"
+#include "proto/person_name.hpp"
 
 namespace vibrig {
 
@@ -15,7 +16,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
         return answer(waiting, {false, "commission: found no JSON object with \"do\""});
     const std::string word = what["do"];
     if (word == "attend") {
-        if (attendance_ && journal::same_person(request.by, attendance_->by))
+        if (attendance_ && proto::same_person(request.by, attendance_->by))
             attendance_->steady = drivers::steady_now();
         return reply_later(waiting, {true, "there"});
     }

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/journal/latches.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "proto/json_text.hpp"
+#include "proto/person_name.hpp"
 
 namespace vibrig::commission {
 
@@ -41,9 +41,7 @@ bool was_found(const Finding& finding, const std::string& key) {
 std::string name_of_person(const std::string& by) { return by.substr(0, by.find(" (")); }
 
 std::string not_two(const std::string& by, const std::string& second) {
-    const std::string name = name_of_person(second);
-    if (name.find_first_not_of(" \t") != std::string::npos && !journal::same_person(by, second))
-        return {};
+    if (!proto::plain_name(second).empty() && !proto::same_person(by, second)) return {};
     return fmt::format("second: found \"{}\", expected the name of another person than {}", second,
                        name_of_person(by));
 }
@@ -140,8 +138,8 @@ std::vector<SignStatement> sign_statements(const Json& json) {
 
 std::string doubt_of_drift_sign(const std::vector<SignStatement>& statements, const std::string& by,
                                 const std::string& second, const configuration::Loaded& file) {
-    if (statements.size() != 2 || !journal::same_person(statements[0].by, by) ||
-        !journal::same_person(statements[1].by, second))
+    if (statements.size() != 2 || !proto::same_person(statements[0].by, by) ||
+        !proto::same_person(statements[1].by, second))
         return fmt::format("drift_sign: expected what {} and {} say of it, each alone",
                            name_of_person(by), second);
     for (const auto& one : statements) {

@@ -16,6 +16,7 @@
 #include "daemon/journal/signing_key.hpp"
 #include "daemon/record/digest.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/person_name.hpp"
 
 namespace vibrig::commission {
 
@@ -131,7 +132,7 @@ std::string Book::doubt_of(const PersonSignature& one) const {
     try {
         const auto name =
             signer_of_detached(statement_of(record_->rig, digests), one.cms, authority, utc_ns);
-        return journal::same_person(name, one.by) ? "" : "it is that of " + name;
+        return proto::same_person(name, one.by) ? "" : "it is that of " + name;
     } catch (const std::invalid_argument& wrong) {
         return wrong.what();
     }
@@ -173,7 +174,7 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             else if (r.meaning != kMeaning)
                 s.why = fmt::format("version {} counts its keys otherwise", r.version);
             else if (!of_the_shaker(part) &&
-                     (r.by.size() < 2 || journal::same_person(r.by[0], r.by[1])))
+                     (r.by.size() < 2 || proto::same_person(r.by[0], r.by[1])))
                 s.why = fmt::format("proven by {}, two persons are asked", fmt::join(r.by, ", "));
             else if (age_days < 0)
                 s.why = fmt::format("proven on {}, which is yet to come: look at the clock",
@@ -210,7 +211,7 @@ std::string Book::signature_gone(Part part) const {
     if (expected == signed_by_.end()) return {};
     for (const auto& by : expected->second) {
         const auto stands = [&](const PersonSignature& one) {
-            return journal::same_person(one.by, by) &&
+            return proto::same_person(one.by, by) &&
                    std::ranges::find(one.parts, part) != one.parts.end();
         };
         if (std::ranges::none_of(record_->persons, stands))

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "daemon/commission/record.hpp"
-#include "daemon/journal/latches.hpp"
 #include "daemon/record/digest.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/person_name.hpp"
 
 namespace vibrig::commission {
 
@@ -72,7 +72,9 @@ std::vector<std::string> two_names(const std::string& text) {
         return first == std::string::npos ? std::string() : name.substr(first, last - first + 1);
     };
     std::vector<std::string> names{trimmed(text.substr(0, comma)), trimmed(text.substr(comma + 1))};
-    if (names[0].empty() || names[1].empty() || journal::same_person(names[0], names[1])) return {};
+    if (proto::plain_name(names[0]).empty() || proto::plain_name(names[1]).empty() ||
+        proto::same_person(names[0], names[1]))
+        return {};
     return names;
 }
 

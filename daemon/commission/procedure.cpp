@@ -1,12 +1,11 @@
 // How a procedure goes on: questions and answers, stopping and going on, its end, and what it
 // shows.
 #include "daemon/commission/procedure.hpp"
+#include "proto/person_name.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
 #include <utility>
-
-#include "daemon/journal/latches.hpp"
 
 namespace vibrig::commission {
 
@@ -39,7 +38,7 @@ void Procedure::open(const std::string& by, bool by_hand, Time now) {
 }
 
 void Procedure::attend(const std::string& by, Time wall) {
-    if (journal::same_person(by, by_)) attended_ = wall;
+    if (proto::same_person(by, by_)) attended_ = wall;
 }
 
 std::string Procedure::step_name() const {
@@ -95,7 +94,7 @@ void Procedure::ask_yes(const std::string& id, const std::string& text, const st
 
 std::string Procedure::answer(const std::string& by, const std::string& id, std::string value) {
     if (doing_ != Doing::asking) return "nothing is asked";
-    if (!journal::same_person(by, by_))
+    if (!proto::same_person(by, by_))
         return fmt::format("{} commissions it, and answers: found {}", by_, by);
     if (id != question_.id)
         return fmt::format("answer: found one to \"{}\", asked is \"{}\"", id, question_.id);

@@ -9,8 +9,8 @@
 
 #include "daemon/commission/procedure.hpp"
 #include "daemon/commission/progress.hpp"
-#include "daemon/journal/latches.hpp"
 #include "proto/durable_file.hpp"
+#include "proto/person_name.hpp"
 
 namespace vibrig::commission {
 
@@ -71,7 +71,7 @@ Kept Progress::read(const std::string& by, bool by_hand, std::int64_t utc_ns) co
         kept.why_not = fmt::format("{}: {:.0f} h old, {:.0f} at most", path_, hours, kGood_h);
     } else if (all.value("rig", Json()) != rig_) {
         kept.why_not = path_ + ": of another can, DBC or gimbal.message";
-    } else if (!journal::same_person(all["by"].get<std::string>(), by)) {
+    } else if (!proto::same_person(all["by"].get<std::string>(), by)) {
         kept.why_not = fmt::format("{}: begun by {}", path_, all["by"].get<std::string>());
     } else if (all["by_hand"] != by_hand) {
         kept.why_not = path_ + (by_hand ? ": moved by command" : ": moved by hand");

@@ -1,36 +1,19 @@
 #include "daemon/journal/latches.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <utility>
+
+#include "proto/person_name.hpp"
 
 namespace vibrig::journal {
 
 namespace {
-
-/// "Ada  Lovelace (uid 0)" -> "ada lovelace".
-std::string plain_name(std::string_view name) {
-    name = name.substr(0, name.find(" ("));
-    std::string plain;
-    bool space = false;
-    for (const char c : name) {
-        if (std::isspace(static_cast<unsigned char>(c)) != 0) {
-            space = !plain.empty();
-            continue;
-        }
-        if (std::exchange(space, false)) plain += ' ';
-        plain += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-    return plain;
-}
 
 void append(std::string& words, const std::string& separator, const std::string& more) {
     words += (words.empty() ? "" : separator) + more;
 }
 
 }  // namespace
-
-bool same_person(std::string_view a, std::string_view b) { return plain_name(a) == plain_name(b); }
 
 void Latches::add(Latch latch) {
     std::erase_if(open_, [&](const Latch& open) { return open.name == latch.name; });
@@ -60,8 +43,8 @@ Latches::Answer Latches::acknowledge(std::string_view what, const std::string& b
     std::string over, refused;
     for (Latch& latch : open_) {
         if (all ? latch.name == kJournalLatch : latch.name != what) continue;
-        const bool armer = !latch.armed_by.empty() && same_person(latch.armed_by, by);
-        const bool again = !latch.first.empty() && same_person(latch.first, by);
+        const bool armer = !latch.armed_by.empty() && proto::same_person(latch.armed_by, by);
+        const bool again = !latch.first.empty() && proto::same_person(latch.first, by);
         const bool enough = !latch.two_persons || (!latch.armed_by.empty() && !armer) ||
                             (!latch.first.empty() && !again);
         if (enough) {

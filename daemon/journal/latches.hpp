@@ -12,10 +12,6 @@ namespace vibrig::journal {
 inline constexpr const char* kDiedArmed = "died_armed";
 inline constexpr const char* kJournalLatch = "journal";
 
-/// Whether two names, as commands carry them ("Ada Lovelace (uid 1000 ...)"), are one person's:
-/// what the person says, whatever its case and spaces.
-[[nodiscard]] bool same_person(std::string_view a, std::string_view b);
-
 /// What has stopped the shaker or forbids arming, until named persons acknowledge it. One thread.
 class Latches {
   public:

@@ -10,6 +10,7 @@
 #include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_message.hpp"
 #include "estimator/identification/result.hpp"
+#include "proto/person_name.hpp"
 #include "proto/text.hpp"
 #include "proto/vibrig.pb.h"
 
@@ -201,7 +202,7 @@ CommandRequest parse_command(const std::string& json) {
     request.kind = kind_of(message.kind());
     request.by = message.by();
     request.argument = message.argument();
-    const bool nameless = request.by.find_first_not_of(' ') == std::string::npos;
+    const bool nameless = proto::plain_name(request.by).empty();
     if (request.kind == CommandRequest::Kind::abort) {
         // A stop does not wait for a better name, nor for what is beside it.
         request.by = nameless ? "somebody" : proto::printable(request.by, kLongestName);

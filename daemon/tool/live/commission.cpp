@@ -19,7 +19,6 @@
 
 #include "daemon/commission/shaker_parts.hpp"
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/journal/latches.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/answers.hpp"
 #include "daemon/tool/live/commission_client.hpp"
@@ -27,6 +26,7 @@
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
 #include "proto/json_text.hpp"
+#include "proto/person_name.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -85,7 +85,7 @@ class Dialogue {
         const bool going_on = !state["procedure"].is_null() && state["procedure"]["active"] == true;
         if (going_on) {
             const std::string began = state["procedure"]["by"];
-            if (!journal::same_person(began, options_.by))
+            if (!proto::same_person(began, options_.by))
                 throw CommissionRefused("the rig is being commissioned by " + began +
                                         ", who answers; vibrig abort ends it");
             print_wrapped(out_, "Going on with what " + began + " began.");

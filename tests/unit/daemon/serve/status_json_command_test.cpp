@@ -59,6 +59,9 @@ TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
     EXPECT_NE(error_of(R"({"kind":99,"by":"A"})").find("kind"), std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"arm"})").find("by: empty"), std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"arm","by":"   "})").find("by: empty"), std::string::npos);
+    // A no-break space, and one of no width
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"\u00a0\u200b"})").find("by: empty"),
+              std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"arm","by":"A\nfaked line"})").find("control character"),
               std::string::npos);
     // What is one line is taken up to its own limit, which is beyond that of a log's line.
