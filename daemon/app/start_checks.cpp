@@ -180,17 +180,19 @@ void check_results(const configuration::Loaded& loaded) {
 }
 
 void check_named(const configuration::Loaded& loaded) {
-    if (const auto& group = loaded.configuration.server.operator_group; !group.empty()) {
-        try {
-            (void)serve::group_named(group);
-        } catch (const serve::ServeError& error) {
-            throw configuration::ConfigurationError(place_of(loaded, "server.operator_group") +
-                                                    error.what());
-        }
-    }
     check_certificates(loaded);
     check_broker_files(loaded);
     check_made_files(loaded);
+}
+
+std::string missing_group(const configuration::Loaded& loaded) {
+    const auto& group = loaded.configuration.server.operator_group;
+    try {
+        if (!group.empty()) (void)serve::group_named(group);
+    } catch (const serve::ServeError& error) {
+        return place_of(loaded, "server.operator_group") + error.what();
+    }
+    return {};
 }
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {

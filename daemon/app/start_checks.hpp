@@ -17,10 +17,12 @@ void check_bindings(const configuration::Loaded& loaded);
 /// there and taken away, since permissions alone do not tell (root, /proc, a full disk).
 void check_results(const configuration::Loaded& loaded);
 /// Throws ConfigurationError unless this machine has what the start opens beside bus and shaker:
-/// the operators' group, the files of `server.remote`, which have to fit together, and of the
-/// broker, the folders of log and journal. What only the daemon's own user may read is left to its
-/// start.
+/// the files of `server.remote`, which have to fit together, and of the broker, the folders of log
+/// and journal. What only the daemon's own user may read is left to its start.
 void check_named(const configuration::Loaded& loaded);
+/// Why the start on this machine would be refused for the operators' group; empty: it would not.
+/// The package makes the group, so that a file checked on a desk may name one that is not there.
+[[nodiscard]] std::string missing_group(const configuration::Loaded& loaded);
 /// What the campaign's positions and levels would leave undetermined; empty if nothing.
 [[nodiscard]] std::vector<std::string> check_plan(
     const configuration::Configuration& configuration);

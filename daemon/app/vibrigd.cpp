@@ -67,6 +67,8 @@ void check_again(const std::string& path) {
         vibrig::check_bindings(loaded);
         vibrig::check_results(loaded);
         vibrig::check_named(loaded);
+        if (const auto why = vibrig::missing_group(loaded); !why.empty())
+            throw vibrig::configuration::ConfigurationError(why);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -225,6 +227,8 @@ void print_check(const vibrig::configuration::Loaded& loaded) {
     for (std::string line; std::getline(words, line);) std::cout << "# " << line << '\n';
     for (const std::string& line : vibrig::configuration::warnings(loaded))
         std::cerr << "warning: " << line << '\n';
+    if (const auto why = vibrig::missing_group(loaded); !why.empty())
+        std::cerr << "warning: " << why << "; a start on this machine is refused\n";
     for (const std::string& line : vibrig::check_plan(loaded.configuration))
         std::cerr << "warning: campaign: " << line << '\n';
     insist(forecast);

@@ -192,8 +192,7 @@ def unwritable(checks, programs, folder):
         check = checked(server=server)
         checks.check(check.returncode == 2 and expected in check.stderr, "--check finds certificates that are not there or are none",
                      check.stderr)
-    for tables, expected in (({"server": {"operator_group": "no-such-group"}}, 'server.operator_group: found "no-such-group", expected a group of this machine'),
-                             ({"mqtt": {"host": "localhost", "ca": "gone.crt"}}, f'mqtt.ca: found "{folder}/gone.crt", expected a file that can be read: No such file'),
+    for tables, expected in (({"mqtt": {"host": "localhost", "ca": "gone.crt"}}, f'mqtt.ca: found "{folder}/gone.crt", expected a file that can be read: No such file'),
                              ({"mqtt": {"host": "localhost", "username": "rig", "password_file": "gone.txt"}},
                               f'mqtt.password_file: found "{folder}/gone.txt", expected a file that can be read: No such file'),
                              ({"journal": {"file": "gone/j.sqlite3"}}, f'journal.file: found "{folder}/gone/j.sqlite3", expected a file in a folder that is there'),
@@ -204,6 +203,12 @@ def unwritable(checks, programs, folder):
                      check.stderr)
         started = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path], capture_output=True, text=True, timeout=30)
         checks.equal((started.returncode, started.stderr), (2, check.stderr), f"{key}: and the start the same")
+    check = checked(server={"operator_group": "no-such-group"})
+    missing = 'server.operator_group: found "no-such-group", expected a group of this machine'
+    checks.check(check.returncode == 0 and f"{missing}; a start on this machine is refused" in check.stderr,
+                 "--check warns of a group that this machine has not: a file may be checked on a desk", check.stderr)
+    started = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path], capture_output=True, text=True, timeout=30)
+    checks.check(started.returncode == 2 and missing in started.stderr, "and the start is refused", started.stderr)
     made = os.path.join(folder, "made")
     check = checked(campaign={"results": made}, journal={"file": os.path.join(made, "journal.sqlite3")})
     checks.equal((check.returncode, os.path.exists(made)), (0, False), "--check knows that the start makes the folder of the results")
