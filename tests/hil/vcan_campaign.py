@@ -25,14 +25,14 @@ STATUS_IDS = {0x210, 0x220, 0x221}
 COMMAND_IDS = {0x200}
 SEED = 7
 ROUNDS = 20  # of garbage
-ATTEMPTS = 3   # of a campaign that the machine itself holds up
+ATTEMPTS = 5   # of a campaign that the machine itself holds up
 
 
 class Sleeper(threading.Thread):
     """Only sleeps: how late it wakes, everything here does. A real rig does not wait meanwhile, so a campaign may end of it."""
 
     TURN_S = 0.05
-    LONG_S = 0.3     # at once: a fifth of what the controller's watchdog waits before it stops the table
+    LONG_S = 0.15    # at once: six of the rig's samples come late, in a row, and their times are not those of the vibration
     MUCH_S = 1.0     # in all: the machine is too slow for real time
 
     def __init__(self):
