@@ -10,6 +10,7 @@
 #include <climits>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,9 +24,9 @@ namespace {
 enum class End { killed, disk };
 
 struct Disk {
-    long left = LONG_MAX;  // writes to regular files that still come to the disk
+    long left = LONG_MAX;  // writes to regular files that still come to the disk; then it is full
     long taken = 0;
-    End end = End::killed;
+    std::function<void(long)> before = {};  // each write: how many came before it
 } disk;
 
 /// What a write comes to; nothing: it goes on as ever.
@@ -33,13 +34,18 @@ bool taken(int file) {
     struct stat kind {};
     if (::fstat(file, &kind) != 0 || !S_ISREG(kind.st_mode)) return true;
     if (disk.left == 0) return false;
+    if (const auto before = std::exchange(disk.before, {})) {  // it writes, too
+        const long taken = disk.taken;
+        before(taken);
+        disk.taken = taken;
+        disk.before = before;
+    }
     --disk.left;
     ++disk.taken;
     return true;
 }
 
-ssize_t not_taken(size_t size) {
-    if (disk.end == End::killed) return static_cast<ssize_t>(size);
+ssize_t not_taken() {
     errno = EIO;
     return -1;
 }
@@ -55,27 +61,27 @@ extern "C" {
 
 ssize_t write(int file, const void* bytes, size_t size) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t)>("write");
-    return taken(file) ? next(file, bytes, size) : not_taken(size);
+    return taken(file) ? next(file, bytes, size) : not_taken();
 }
 
 ssize_t pwrite(int file, const void* bytes, size_t size, off_t at) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite");
-    return taken(file) ? next(file, bytes, size, at) : not_taken(size);
+    return taken(file) ? next(file, bytes, size, at) : not_taken();
 }
 
 ssize_t pwrite64(int file, const void* bytes, size_t size, off64_t at) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t, off64_t)>("pwrite64");
-    return taken(file) ? next(file, bytes, size, at) : not_taken(size);
+    return taken(file) ? next(file, bytes, size, at) : not_taken();
 }
 
 int ftruncate(int file, off_t size) noexcept {
     static const auto next = real<int (*)(int, off_t)>("ftruncate");
-    return taken(file) ? next(file, size) : static_cast<int>(not_taken(0));
+    return taken(file) ? next(file, size) : static_cast<int>(not_taken());
 }
 
 int ftruncate64(int file, off64_t size) noexcept {
     static const auto next = real<int (*)(int, off64_t)>("ftruncate64");
-    return taken(file) ? next(file, size) : static_cast<int>(not_taken(0));
+    return taken(file) ? next(file, size) : static_cast<int>(not_taken());
 }
 }
 
@@ -147,7 +153,19 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
     const fs::path whole = folder_ / "whole";
     fs::create_directory(whole);
     disk = {};
+    const auto keep = [&](long taken) {
+        const fs::path left = folder_ / std::to_string(taken);
+        fs::create_directory(left);
+        for (const auto& file : fs::directory_iterator(whole)) fs::copy(file, left);
+    };
+    // What is there before a write is left of one who is killed before it.
+    if (how == End::killed) disk.before = keep;
     const auto reported = write_campaign(whole, commits);
+    disk.before = {};
+    if (const long taken = disk.taken; how == End::killed) {
+        keep(taken);
+        disk.taken = taken;
+    }
     ASSERT_EQ(reported.size(), static_cast<std::size_t>(commits) + 1);
     const long first = reported.front().first, last = disk.taken;
     ASSERT_GT(last, first + 100);
@@ -155,10 +173,12 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
     for (long end = first; end <= last; ++end, ++torn) {
         // WHEN the writer ends at this one
         const fs::path folder = folder_ / std::to_string(end);
-        fs::create_directory(folder);
-        disk = {end, 0, how};
-        static_cast<void>(write_campaign(folder, commits));
-        disk = {};
+        if (how == End::disk) {
+            fs::create_directory(folder);
+            disk = {end};
+            static_cast<void>(write_campaign(folder, commits));
+            disk = {};
+        }
         // THEN what was committed before is there once it is mended
         std::size_t committed = 0;
         for (const auto& [writes, samples] : reported)
