@@ -143,8 +143,7 @@ def makes_interfaces(checks):
 
 def configure(rig, **more):
     rig.configure(rig.campaign, can={"sample_rate_hz": 40.0, **r.PATIENT["can"]}, gimbal=r.PATIENT["gimbal"],
-                  # dpkg keeps the machine busy for seconds
-                  shaker={**r.PATIENT["shaker"], "watchdog_period_ms": 2500}, server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
+                  shaker=r.PATIENT["shaker"], server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
                           "page": "127.0.0.1:8090"}, **more)
     os.chmod(CONFIGURATION, 0o640)
     shutil.chown(CONFIGURATION, "root", "vibrig")
