@@ -31,6 +31,14 @@ auto stop_of(Bench& bench) {
     return steady_clock::now() - began;
 }
 
+/// The first that is not the watchdog's: a feed may be under way when the stop is ordered.
+Request first_write(const TestServer& server) {
+    for (const Request& write : server.writes())
+        if (write.address != kWatchdog) return write;
+    ADD_FAILURE() << "nothing was written";
+    return {};
+}
+
 TEST(ShakerTrip, RampZeroAndRunZeroAreOneWriteWhereTheyLieSideBySide) {
     TestServer server;
     Bench bench(settings_for(server));
@@ -38,10 +46,9 @@ TEST(ShakerTrip, RampZeroAndRunZeroAreOneWriteWhereTheyLieSideBySide) {
     ASSERT_EQ(server.holding(kRampTime), 6000);
     server.forget();
     stop_of(bench);
-    const auto writes = server.writes();
-    ASSERT_FALSE(writes.empty());
-    EXPECT_EQ(writes.front().address, kRampTime);
-    EXPECT_EQ(writes.front().values, (std::vector<std::uint16_t>{0, 0}));
+    const Request write = first_write(server);
+    EXPECT_EQ(write.address, kRampTime);
+    EXPECT_EQ(write.values, (std::vector<std::uint16_t>{0, 0}));
     EXPECT_EQ(server.holding(kRampTime), 0);
     EXPECT_EQ(server.holding(kRun), 0);
     // AND the next set-point brings its own ramp
@@ -158,7 +165,7 @@ TEST(ShakerTrip, AJointWriteThatIsAcknowledgedAndIgnoredIsFollowedByRunZeroAlone
     ASSERT_TRUE(bench.apply(kSlow));
     server.forget();
     stop_of(bench);
-    EXPECT_TRUE(is_joint(server.writes().front()));
+    EXPECT_TRUE(is_joint(first_write(server)));
 }
 
 TEST(ShakerTrip, AJointWriteThatCameToNothingIsNotTriedAgainOverReconnections) {
