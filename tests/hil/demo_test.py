@@ -17,7 +17,7 @@ import rig as r  # noqa: E402
 DEMO = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "daemon", "demo"))
 
 
-def demo(*arguments, temporary, timeout=400):
+def demo(*arguments, temporary, timeout=1500):
     return subprocess.run([DEMO, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                           timeout=timeout, cwd=temporary, env={**os.environ, "TMPDIR": temporary}, preexec_fn=with_us)
 
