@@ -153,8 +153,6 @@ def die_with_parent(number=signal.SIGKILL):
 class Rig:
     """vibrig-plant and vibrigd in one temporary folder. `bus`: "vcan0", or "seqpacket". The plant starts first."""
 
-    commands = None   # the folder of vibrig, where it is another than that of the programs
-
     def __init__(self, programs, bus, clock, folder, poll_s=0.25):
         self.programs, self.bus, self.clock, self.folder, self.poll_s = programs, bus, clock, folder, poll_s
         self.modbus_port = None
@@ -167,7 +165,7 @@ class Rig:
         os.makedirs(self.results, exist_ok=True)
 
     def program(self, name):
-        return os.path.join(self.commands if self.commands and name == "vibrig" else self.programs, name)
+        return os.path.join(self.programs, name)
 
     def configure(self, campaign, **tables):
         can = {"port": "seqpacket", "path": self.path} if self.bus == "seqpacket" else {"interface": self.bus}

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Campaigns over the seqpacket bus on the rig's clock, with programs built under a sanitizer.
 
-usage: seqpacket_campaign.py PROGRAMS [COMMANDS]     COMMANDS: the folder of vibrig, where it is another
+usage: seqpacket_campaign.py PROGRAMS
 """
 import json
 import os
@@ -67,7 +67,6 @@ def start(rig, **other):
 
 def main():
     programs = r.programs_from_command_line(__doc__)
-    r.Rig.commands = sys.argv[2] if len(sys.argv) > 2 else None
     checks = r.Checks()
     for part in (campaign, end_without_rig):
         with tempfile.TemporaryDirectory() as folder:
