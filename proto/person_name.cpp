@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "proto/utf8.hpp"
+
 namespace vibrig::proto {
 
 namespace {
@@ -41,20 +43,6 @@ bool is_in(const Ranges& ranges, char32_t code) {
                                [&](const Range& r) { return code >= r.first && code <= r.second; });
 }
 
-/// The bytes of the character at the text's beginning, and what it is; of what is no UTF-8 a byte.
-std::pair<std::size_t, char32_t> first_of(std::string_view text) {
-    const auto lead = static_cast<unsigned char>(text.front());
-    const std::size_t length = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : lead >= 0xc2 ? 2 : 1;
-    if (length == 1 || length > text.size()) return {1, lead};
-    char32_t code = lead & (0xffU >> (length + 1));
-    for (const char c : text.substr(1, length - 1)) {
-        const auto byte = static_cast<unsigned char>(c);
-        if ((byte & 0xc0U) != 0x80) return {1, lead};
-        code = code << 6U | (byte & 0x3fU);
-    }
-    return {length, code};
-}
-
 }  // namespace
 
 std::string plain_name(std::string_view name) {
@@ -62,12 +50,12 @@ std::string plain_name(std::string_view name) {
     std::string plain;
     bool space = false;
     while (!name.empty()) {
-        const auto [length, code] = first_of(name);
-        const std::string_view bytes = name.substr(0, length);
-        name.remove_prefix(length);
-        if (is_in(kSpaces, code)) {
+        const auto [length, code] = first_character(name);
+        const std::string_view bytes = name.substr(0, std::max<std::size_t>(length, 1));
+        name.remove_prefix(bytes.size());
+        if (length != 0 && is_in(kSpaces, code)) {
             space = !plain.empty();
-        } else if (!is_in(kNothing, code)) {
+        } else if (length == 0 || !is_in(kNothing, code)) {
             if (std::exchange(space, false)) plain += ' ';
             const char c = bytes.front();
             plain += c >= 'A' && c <= 'Z' ? std::string(1, static_cast<char>(c - 'A' + 'a'))

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "proto/utf8.hpp"
+
 namespace vibrig::proto {
 
 namespace {
@@ -37,11 +39,9 @@ std::string shown(std::string_view bytes) {
         {{'\n', "\\n"}, {'\r', "\\r"}, {'\t', "\\t"}}};
     for (const auto& [byte, name] : kNamed)
         if (bytes.front() == byte) return name;
-    unsigned code = static_cast<unsigned char>(bytes.front());
-    const bool foreign = bytes.size() == 1 && code >= 0x80;
-    if (bytes.size() > 1) code &= 0xFFU >> (bytes.size() + 1);
-    for (const char byte : bytes.substr(1))
-        code = code << 6U | (static_cast<unsigned>(byte) & 0x3FU);
+    const auto [length, character] = first_character(bytes);
+    const bool foreign = length == 0;
+    const auto code = static_cast<unsigned>(character);
     const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
     const bool turns = code == 0x200E || code == 0x200F || (code >= 0x2028 && code <= 0x202E) ||
                        (code >= 0x2066 && code <= 0x2069);
@@ -52,6 +52,15 @@ std::string shown(std::string_view bytes) {
 }
 
 }  // namespace
+
+Utf8Character first_character(std::string_view text) noexcept {
+    const std::size_t length = sequence_length(text);
+    char32_t code = static_cast<unsigned char>(text.front());
+    if (length > 1) code &= 0xffU >> (length + 1);
+    for (std::size_t i = 1; i < length; ++i)
+        code = code << 6U | (static_cast<unsigned char>(text[i]) & 0x3fU);
+    return {length, code};
+}
 
 std::string printable(std::string_view text, std::size_t longest) {
     std::string out;
