@@ -86,15 +86,19 @@ def take_up(checks, rig, what, count):
     checks.check(on.returncode == 0 and f"{known} of {count}" in on.stdout, f"{what}: armed, it resumes on command", on.stdout + on.stderr)
 
 
+def begin(rig):
+    rig.start_plant("--seed", "3", "--speed", "20")
+    rig.configure(CAMPAIGN)
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    for command in ("arm", "start"):
+        rig.tool(command, "--by", "Ada")
+
+
 def killed_and_resumed(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
-        rig.start_plant("--seed", "3", "--speed", "20")
-        rig.configure(CAMPAIGN)
-        rig.start_daemon()
-        rig.wait_for(r.measuring, 60)
-        for command in ("arm", "start"):
-            rig.tool(command, "--by", "Ada")
+        begin(rig)
         for kills in (1, 3):
             status = rig.wait_for(lambda s, n=kills: len(s["campaign"]["dwells"]) >= n and
                                   s["campaign"]["state"] == "recording", 120)
@@ -145,12 +149,7 @@ def ended_in_order(checks, programs, folder):
     """SIGTERM, as the service manager's stop, is an abort: the campaign is over, as docs/operating.md says."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
-        rig.start_plant("--seed", "3", "--speed", "20")
-        rig.configure(CAMPAIGN)
-        rig.start_daemon()
-        rig.wait_for(r.measuring, 60)
-        for command in ("arm", "start"):
-            rig.tool(command, "--by", "Ada")
+        begin(rig)
         rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
         checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 0, "stopped in a dwell: vibrigd ends in order")
         with sqlite3.connect(f"file:{journal(rig)}?mode=ro", uri=True) as database:
