@@ -33,7 +33,7 @@ SyncClock::SyncClock(Time nominal_period) noexcept
 void SyncClock::reset() noexcept {
     size_ = next_ = 0;
     offset_ = slope_ = 0;
-    has_suspect_ = false;
+    suspects_ = 0;
 }
 
 void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
@@ -42,21 +42,22 @@ void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
         if (count <= anchor_.count) return;
         const double off = static_cast<double>(stamp - time_of(count));
         if (std::abs(off) > kStepPeriods * nominal_) {
-            // One late stamp is an accident. A second one at the device's own distance from it is
-            // the device's new time.
+            // Late stamps are an accident, and those of what catches up come closer together than
+            // the device made them. Some at its own distance are the device's new time.
             const double apart = static_cast<double>(stamp - suspect_.stamp) -
                                  nominal_ * static_cast<double>(count - suspect_.count);
-            if (!has_suspect_ || std::abs(apart) > 0.5 * nominal_) {
+            if (suspects_ == 0 || std::abs(apart) > 0.5 * nominal_) {
                 suspect_ = point;
-                has_suspect_ = true;
+                suspects_ = 1;
                 return;
             }
+            if (++suspects_ < kStepStamps) return;
             const Point first = suspect_;
             reset();
             ++steps_;
             insert(first);
         }
-        has_suspect_ = false;
+        suspects_ = 0;
     }
     insert(point);
     fit();

@@ -21,13 +21,14 @@ class SyncClock {
     [[nodiscard]] Time time_of(std::int64_t count) const noexcept;
     /// Forgets everything but the nominal period: the device has started anew.
     void reset() noexcept;
-    /// Times the stamps stepped away for good (two in a row by more than 5 periods) and the fit
-    /// began anew.
+    /// Times the stamps stepped away for good (kStepStamps in a row by more than kStepPeriods, on
+    /// one line) and the fit began anew.
     [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
 
   private:
     static constexpr std::size_t kWindow = 64;
     static constexpr double kStepPeriods = 5;
+    static constexpr int kStepStamps = 4;
     struct Point {
         std::int64_t count = 0;
         Time stamp = 0;
@@ -43,8 +44,8 @@ class SyncClock {
     Point anchor_;       ///< origin of the fit: the newest point
     double offset_ = 0;  ///< of the line at the anchor's count, ns after the anchor's stamp
     double slope_ = 0;   ///< period minus nominal, ns
-    Point suspect_;      ///< the last stamp far off
-    bool has_suspect_ = false;
+    Point suspect_;      ///< the first of the last stamps that are far off, all as far
+    int suspects_ = 0;
     std::uint64_t steps_ = 0;
 };
 

@@ -32,7 +32,7 @@ class Sleeper(threading.Thread):
     """Only sleeps: how late it wakes, everything here does. A real rig does not wait meanwhile, so a campaign may end of it."""
 
     TURN_S = 0.05
-    LONG_S = 0.15    # at once: six of the rig's samples come late, in a row, and their times are not those of the vibration
+    LONG_S = 0.15    # at once: the samples of six periods come late, and what is asked of the shaker does
     MUCH_S = 1.0     # in all: the machine is too slow for real time
 
     def __init__(self):
