@@ -227,7 +227,7 @@ void SampleAssembler::Impl::take_sync(const MessagePlan& message, const Received
         return;
     }
     drop_suspect();
-    if (place(count, message, frame)) clock.observe(count, frame.time);
+    if (place(count, message, frame) && clock.observe(count, frame.time)) ++counters.resyncs;
 }
 
 void SampleAssembler::Impl::suspect_restart(std::uint64_t raw, unsigned bits,

@@ -57,7 +57,7 @@ struct AssemblerCounters {
     std::uint64_t contradicting = 0;
     std::uint32_t contradicting_id = 0;
     std::uint64_t gaps = 0;     ///< sync counts that never showed
-    std::uint64_t resyncs = 0;  ///< jumps of the counter (device restart)
+    std::uint64_t resyncs = 0;  ///< jumps of the counter (device restart) or of its time
 };
 
 /// Joins frames of one sync count into Samples. One thread; no allocation after construction; no

@@ -36,10 +36,11 @@ void SyncClock::reset() noexcept {
     suspects_ = 0;
 }
 
-void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
+bool SyncClock::observe(std::int64_t count, Time stamp) noexcept {
     const Point point{count, stamp};
+    bool stepped = false;
     if (size_ > 0) {
-        if (count <= anchor_.count) return;
+        if (count <= anchor_.count) return false;
         const double off = static_cast<double>(stamp - time_of(count));
         if (std::abs(off) > kStepPeriods * nominal_) {
             // Late stamps are an accident, and those of what catches up come closer together than
@@ -49,18 +50,19 @@ void SyncClock::observe(std::int64_t count, Time stamp) noexcept {
             if (suspects_ == 0 || std::abs(apart) > 0.5 * nominal_) {
                 suspect_ = point;
                 suspects_ = 1;
-                return;
+                return false;
             }
-            if (++suspects_ < kStepStamps) return;
+            if (++suspects_ < kStepStamps) return false;
             const Point first = suspect_;
             reset();
-            ++steps_;
+            stepped = true;
             insert(first);
         }
         suspects_ = 0;
     }
     insert(point);
     fit();
+    return stepped;
 }
 
 void SyncClock::insert(Point point) noexcept {

@@ -15,15 +15,14 @@ class SyncClock {
   public:
     explicit SyncClock(Time nominal_period) noexcept;
 
-    /// Counts come in ascending order; one that does not is ignored.
-    void observe(std::int64_t count, Time stamp) noexcept;
+    /// Counts come in ascending order; one that does not is ignored. True: the stamps have stepped
+    /// away for good (kStepStamps in a row by more than kStepPeriods, on one line), and the fit
+    /// begins anew.
+    bool observe(std::int64_t count, Time stamp) noexcept;
     /// Whole microseconds; before the first observation 0.
     [[nodiscard]] Time time_of(std::int64_t count) const noexcept;
     /// Forgets everything but the nominal period: the device has started anew.
     void reset() noexcept;
-    /// Times the stamps stepped away for good (kStepStamps in a row by more than kStepPeriods, on
-    /// one line) and the fit began anew.
-    [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
 
   private:
     static constexpr std::size_t kWindow = 64;
@@ -46,7 +45,6 @@ class SyncClock {
     double slope_ = 0;   ///< period minus nominal, ns
     Point suspect_;      ///< the first of the last stamps that are far off, all as far
     int suspects_ = 0;
-    std::uint64_t steps_ = 0;
 };
 
 }  // namespace vibrig::drivers

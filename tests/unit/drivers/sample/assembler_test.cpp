@@ -258,6 +258,21 @@ TEST_F(Assembler, FollowsARestartOfTheDevice) {
     expect_closed();
 }
 
+TEST_F(Assembler, CountsADeviceWhoseTimeStoodStill) {
+    for (std::uint32_t count = 0; count < 20; ++count) feed(count);
+    // WHEN the count goes on where it was, 40 periods later
+    for (std::uint32_t count = 20; count < 40; ++count) {
+        for (const ReceivedFrame& f : frames_of_count(count, time_of(count + 40)))
+            assembler_->feed(f);
+    }
+    // THEN no sample is lost, the newest have the new time, and it is counted once
+    ASSERT_EQ(samples_.size(), 40u);
+    EXPECT_EQ(samples_.back().time, time_of(39 + 40));
+    EXPECT_EQ(assembler_->counters().resyncs, 1u);
+    EXPECT_EQ(assembler_->counters().gaps, 0u);
+    expect_closed();
+}
+
 TEST_F(Assembler, IsNotMisledByOneWrongCount) {
     for (std::uint32_t count = 100; count < 120; ++count) {
         feed(count);

@@ -63,10 +63,9 @@ TEST(SyncClock, IsNotMovedByOneStampFarOff) {
         const Time device = kStart + count * kPeriod;
         // GIVEN one stamp a second late, and one 20 ms late
         const Time delay = count == 100 ? kSecond : count == 150 ? 20 * kMillisecond : 0;
-        clock.observe(count, device + delay);
+        EXPECT_FALSE(clock.observe(count, device + delay));
         EXPECT_EQ(clock.time_of(count), device) << count;
     }
-    EXPECT_EQ(clock.steps(), 0u);
 }
 
 TEST(SyncClock, KeepsTheDeviceTimeThroughABurstAfterAPause) {
@@ -75,10 +74,9 @@ TEST(SyncClock, KeepsTheDeviceTimeThroughABurstAfterAPause) {
     for (std::int64_t count = 0; count < 300; ++count) {
         const Time device = kStart + count * kPeriod;
         const Time stamp = count >= 100 && count < 140 ? kStart + 140 * kPeriod : device;
-        clock.observe(count, stamp);
+        EXPECT_FALSE(clock.observe(count, stamp));
         EXPECT_EQ(clock.time_of(count), device) << count;
     }
-    EXPECT_EQ(clock.steps(), 0u);
 }
 
 TEST(SyncClock, KeepsTheDeviceTimeWhileWhatWasHeldUpCatchesUp) {
@@ -90,11 +88,10 @@ TEST(SyncClock, KeepsTheDeviceTimeWhileWhatWasHeldUpCatchesUp) {
         const Time device = kStart + count * kPeriod;
         const Time least = count >= 100 ? kStart + 112 * kPeriod : 0;
         handed_on = std::max({device, least, handed_on + kPeriod * 7 / 10});
-        clock.observe(count, handed_on);
+        EXPECT_FALSE(clock.observe(count, handed_on));
         // THEN its times stay
         EXPECT_EQ(clock.time_of(count), device) << count;
     }
-    EXPECT_EQ(clock.steps(), 0u);
 }
 
 TEST(SyncClock, BeginsAnewWhenTheStampsStepForGood) {
@@ -102,13 +99,12 @@ TEST(SyncClock, BeginsAnewWhenTheStampsStepForGood) {
     for (std::int64_t count = 0; count < 200; ++count) {
         // GIVEN a device that stood still for 10 s between two counts
         const Time stamp = kStart + count * kPeriod + (count >= 100 ? 10 * kSecond : 0);
-        clock.observe(count, stamp);
+        EXPECT_EQ(clock.observe(count, stamp), count == 103);
         // THEN three stamps are not believed, the fourth is
         if (count < 100 || count >= 103) {
             EXPECT_EQ(clock.time_of(count), stamp) << count;
         }
     }
-    EXPECT_EQ(clock.steps(), 1u);
 }
 
 TEST(SyncClock, SurvivesAFirstStampThatWasLate) {
