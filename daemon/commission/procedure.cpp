@@ -252,16 +252,16 @@ std::string Procedure::progress() const {
 
 Json Procedure::state(std::size_t after) const {
     Json question;
-    if (doing_ == Doing::asking)
-        question = {{"id", question_.id},
-                    {"text", question_.text},
-                    {"expected", question_.expected},
-                    {"usual", question_.usual}};
+    if (const Question* asked = asks())
+        question = {{"id", asked->id},
+                    {"text", asked->text},
+                    {"expected", asked->expected},
+                    {"usual", asked->usual}};
     Json lines = Json::array();
     for (std::size_t i = after; i < lines_.size(); ++i) lines.push_back(lines_[i]);
     return {{"active", active()},
             {"by", by_},
-            {"moving", doing_ == Doing::moving || doing_ == Doing::settling},
+            {"moving", moves()},
             {"question", question},
             {"lines", lines},
             {"next", lines_.size()},

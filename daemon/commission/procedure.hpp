@@ -70,6 +70,13 @@ class Procedure {
     [[nodiscard]] bool active() const noexcept { return doing_ != Doing::nothing; }
     [[nodiscard]] const std::string& by() const noexcept { return by_; }
     [[nodiscard]] bool by_hand() const noexcept { return by_hand_; }
+    /// What is asked; null: nothing.
+    [[nodiscard]] const Question* asks() const noexcept {
+        return doing_ == Doing::asking ? &question_ : nullptr;
+    }
+    [[nodiscard]] bool moves() const noexcept {
+        return doing_ == Doing::moving || doing_ == Doing::settling;
+    }
     /// Who does what, on one line, for those who only watch.
     [[nodiscard]] std::string progress() const;
     [[nodiscard]] const Finding& finding() const noexcept { return finding_; }

@@ -133,7 +133,7 @@ void Procedure::begin_again(const std::string& by, bool by_hand, const Kept& kep
 void Procedure::replay(const Json& log) {
     replaying_ = true;
     for (std::size_t at = 0; active();) {
-        if (doing_ == Doing::moving || doing_ == Doing::settling) {
+        if (moves()) {
             travel_ = asked_;
             for (; at < log.size() && log.at(at).contains("short"); ++at) replay_stop(log.at(at));
             legs_.clear();

@@ -209,13 +209,12 @@ class Commissioned : public ::testing::Test {
             now += kSecond / 10;
             if (attended) procedure->attend("Ada", now);
             procedure->step(now, now);
-            const Json state = procedure->state(0);
-            if (state["question"].is_null()) continue;
-            const std::string id = state["question"]["id"];
-            if (id == until) return state;
+            const Question* question = procedure->asks();
+            if (question == nullptr) continue;
+            const std::string id = question->id;
+            if (id == until) return procedure->state(0);
             asked.push_back(id);
-            EXPECT_EQ(procedure->answer("Ada", id, answer_to(id, state["question"]["text"])), "")
-                << id;
+            EXPECT_EQ(procedure->answer("Ada", id, answer_to(id, question->text)), "") << id;
         }
         return procedure->state(0);
     }
@@ -236,19 +235,18 @@ class Commissioned : public ::testing::Test {
             now += kSecond / 20;
             procedure->attend("Ada", now);
             procedure->step(now, now);
-            const Json question = procedure->state(0)["question"];
-            if (question.is_null() && done()) return;
-            if (question.is_null()) continue;
-            ASSERT_EQ(procedure->answer("Ada", question["id"],
-                                        answer_to(question["id"], question["text"])),
-                      "");
+            const Question* question = procedure->asks();
+            if (question == nullptr && done()) return;
+            if (question == nullptr) continue;
+            const std::string id = question->id;
+            ASSERT_EQ(procedure->answer("Ada", id, answer_to(id, question->text)), "");
         }
         FAIL() << procedure->state(0).dump(1);
     }
 
     [[nodiscard]] std::string question() const {
-        const Json state = procedure->state(0);
-        return state["question"].is_null() ? "" : state["question"]["id"].get<std::string>();
+        const Question* asked_now = procedure->asks();
+        return asked_now == nullptr ? "" : asked_now->id;
     }
 
     Wired wired{*this};

@@ -16,14 +16,13 @@ class Moved : public Commissioned {
         rig_of(1);
         procedure->begin("Ada", false, now);
         run_until([this] {
-            return most_travel[0] > 40 && procedure->state(0)["moving"] == true &&
-                   arrives > now + kSecond;
+            return most_travel[0] > 40 && procedure->moves() && arrives > now + kSecond;
         });
     }
     /// Into a mean of a sweep: all gimbals stand.
     void into_a_mean() {
         into_a_sweep();
-        run_until([this] { return procedure->state(0)["moving"] == false; });
+        run_until([this] { return !procedure->moves(); });
         pass(1);
     }
 };
@@ -50,9 +49,9 @@ TEST_F(Moved, WithNobodyAtTheToolItStopsAndGoesOnByPermissionOnly) {
         now += kSecond / 20;
         procedure->attend("Ada", now);
         procedure->step(now, now);
-        const Json question = procedure->state(0)["question"];
-        if (question.is_null()) continue;
-        ASSERT_EQ(procedure->answer("Ada", question["id"], answer_to(question["id"], "")), "");
+        if (procedure->asks() == nullptr) continue;
+        const std::string id = question();
+        ASSERT_EQ(procedure->answer("Ada", id, answer_to(id, "")), "");
     }
     ASSERT_TRUE(procedure->active());
     attended = false;
@@ -125,7 +124,7 @@ TEST_F(Moved, SomebodyElseAtAnotherToolIsNobodyHere) {
     EXPECT_THAT(procedure->answer("Bo (uid 1000)", "go_on", "yes"),
                 HasSubstr("Ada commissions it, and answers: found Bo"));
     EXPECT_EQ(procedure->answer("ada (uid 1000)", "go_on", "yes"), "") << "the same person";
-    EXPECT_TRUE(procedure->state(0)["moving"] == true);
+    EXPECT_TRUE(procedure->moves());
 }
 
 TEST_F(Moved, AnAnswerIsKeptWithWhoGaveIt) {
@@ -171,7 +170,7 @@ TEST_F(Moved, WhatWasPushedMeanwhileDoesNotGoTheLongWayRound) {
     answers["stop"] = "release";
     rig_of(1);
     procedure->begin("Ada", false, now);
-    run_until([this] { return most_travel[2] > 110 && procedure->state(0)["moving"] == false; });
+    run_until([this] { return most_travel[2] > 110 && !procedure->moves(); });
     procedure->stop("by Ada", now);
     ASSERT_EQ(released, 1);
     travel[2] -= 175;  // by hand
@@ -185,7 +184,7 @@ TEST_F(Moved, WhatWasPushedMeanwhileDoesNotGoTheLongWayRound) {
 TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
     rig_of(1);
     procedure->begin("Ada", false, now);
-    run_until([this] { return released == 2 && procedure->state(0)["moving"] == false; });
+    run_until([this] { return released == 2 && !procedure->moves(); });
     pass(10);
     const int before = slews;
     procedure->stop("by Ada", now);

@@ -26,11 +26,10 @@ class Resumed : public Commissioned {
             now += kSecond / 10;
             procedure->attend("Ada", now);
             procedure->step(now, now);
-            const Json question = procedure->state(0)["question"];
-            if (question.is_null() || kept.size() >= entries) continue;
-            EXPECT_EQ(procedure->answer("Ada", question["id"],
-                                        answer_to(question["id"], question["text"])),
-                      "");
+            const Question* question = procedure->asks();
+            if (question == nullptr || kept.size() >= entries) continue;
+            const std::string id = question->id;
+            EXPECT_EQ(procedure->answer("Ada", id, answer_to(id, question->text)), "");
         }
     }
 
