@@ -27,6 +27,8 @@ bool LineReader::fill() {
 
 std::string_view LineReader::take(std::size_t length) {
     const std::string_view whole(buffer_.data() + begin_, length);
+    if (whole.starts_with("\x1f\x8b"))
+        throw std::runtime_error("found a file packed by gzip, expected text in UTF-8");
     const std::size_t carriage = whole.find('\r');
     if (carriage != std::string_view::npos && carriage + 1 < length)
         throw std::runtime_error(

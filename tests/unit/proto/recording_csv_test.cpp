@@ -429,6 +429,8 @@ TEST_F(Recording, NamesDecimalCommasAmongCommasAndLinesThatEndInACarriageReturn)
 }
 
 TEST_F(Recording, RefusesWhatIsNoText) {
+    EXPECT_EQ(error("\x1f\x8b\x08packed\rlines\n"),
+              ":1: found a file packed by gzip, expected text in UTF-8");
     EXPECT_EQ(row_error(std::string("1,1,1,0,0,0,0,0,\0", 17)),
               ":3: found a NUL byte, expected text in UTF-8");
     EXPECT_EQ(row_error(std::string((std::size_t{1} << 20) + 1, '1')),
