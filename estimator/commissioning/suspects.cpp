@@ -212,6 +212,8 @@ class Search {
                                            {1 / 1000.0, "milliseconds"},
                                            {1e-6, "microseconds"},
                                            {1000.0, "units of 1000 s"},
+                                           {2.0, "units of 2 s"},
+                                           {0.5, "units of 0.5 s"},
                                            {1 / 60.0, "1/60 s"}}) {
             auto scaled = dwells_;
             for (DwellMean& dwell : scaled) {

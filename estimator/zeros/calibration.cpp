@@ -304,10 +304,13 @@ struct Calibration::Impl {
                              name(i), point.zero_mg[i], kLargestZero_mg,
                              1 + (settings.inverted ? -1e-3 : 1e-3) * point.zero_mg[i], name(i),
                              settings.inverted ? "down" : "up"));
+                // Turned by a wrong azimuth, gravity's tilt looks like zeros.
+                const std::string off = azimuth_off();
                 return give_up(
                     text("zero of accelerometer %c is %.4g mg, outside the small-error range of "
-                         "%.0f mg: level first",
-                         name(i), point.zero_mg[i], kLargestZero_mg));
+                         "%.0f mg: %s",
+                         name(i), point.zero_mg[i], kLargestZero_mg,
+                         off.empty() ? "level first" : off.c_str()));
             }
         }
         interval_s = turned_rad = 0;
@@ -315,6 +318,15 @@ struct Calibration::Impl {
         force_sum.setZero();
         force_squares.setZero();
         return true;
+    }
+
+    /// Empty: the vertical gyro and the read-out turn alike.
+    [[nodiscard]] std::string azimuth_off() const {
+        if (!gain || !(std::abs(gain->value()) > kLargestGain)) return {};
+        return text(
+            "the vertical gyro turns by %.4g times the azimuth read-out, expected 1 within %.0f "
+            "%%: sign, axes or unit of the increments or of the read-out",
+            1 + gain->value(), 100 * kLargestGain);
     }
 
     /// Gravity with the wrong sign looks like a zero of 2 g.
@@ -407,12 +419,7 @@ struct Calibration::Impl {
                     : "lengthen the run until a whole sweep has passed, and wait for the unit to "
                       "be warm"));
         }
-        if (!given_up && gain && std::abs(gain->value()) > kLargestGain) {
-            r.problems.push_back(text(
-                "the vertical gyro turns by %.4g times the azimuth read-out, expected 1 within "
-                "%.0f %%: sign, axes or unit of the increments",
-                1 + gain->value(), 100 * kLargestGain));
-        }
+        if (const auto off = azimuth_off(); !given_up && !off.empty()) r.problems.push_back(off);
         const InnovationStatistic& v = innovation;
         const bool last_outside = v.blocks > 0 && outside(v);
         if (!last_outside && v.outside < 2) return;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <optional>
@@ -130,6 +131,35 @@ TEST(Contradiction, NamesTheKeyThatWouldExplainIt) {
     ASSERT_NE(of.first, "");
     EXPECT_THAT(of.warnings.back(), HasSubstr("suspects, best first: platform.encoder_sign: 1 "
                                               "instead of -1 of the outer"));
+}
+
+TEST(Contradiction, NamesTheUnitOfTheAnglesAndOfTheTime) {
+    // GIVEN radians in columns of degrees
+    const auto radians = found({}, 28, {}, [](std::size_t, Measurement& m) {
+        for (double& angle : m.angle_rad) angle = std::remainder(angle, 2 * kPi) * kRadPerDeg;
+    });
+    EXPECT_THAT(radians.warnings.back(), HasSubstr("alpha_deg, beta_deg, gamma_deg: in radians"));
+    // OR from 0 to a whole turn, at whose ends the readings of a dwell jump
+    const auto turns = found({}, 28, {}, [](std::size_t, Measurement& m) {
+        for (double& angle : m.angle_rad) {
+            angle = std::remainder(angle, 2 * kPi);
+            angle = (angle < 0 ? angle + 2 * kPi : angle) * kRadPerDeg;
+        }
+    });
+    EXPECT_THAT(turns.warnings.back(), HasSubstr("alpha_deg, beta_deg, gamma_deg: in radians"));
+    // OR times twice as long, or half
+    const auto twice = found({}, 28, {}, [](std::size_t, Measurement& m) { m.time_s *= 2; });
+    EXPECT_THAT(twice.warnings.back(), HasSubstr("time_s: it is in units of 0.5 s"));
+    const auto half = found({}, 28, {}, [](std::size_t, Measurement& m) { m.time_s /= 2; });
+    EXPECT_THAT(half.warnings.back(), HasSubstr("time_s: it is in units of 2 s"));
+}
+
+TEST(Contradiction, DoesNotPutAnEncodersZeroDownToRadians) {
+    Settings settings;
+    settings.encoder_zero_deg = {2, 0, 0};
+    for (const std::size_t dwells : {1U, 2U, 14U})
+        for (const auto& words : found(settings, dwells).warnings)
+            EXPECT_THAT(words, ::testing::Not(HasSubstr("radians")));
 }
 
 TEST(Contradiction, AsksNoDwellThatIsApartAndNoSweep) {

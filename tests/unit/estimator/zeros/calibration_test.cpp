@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/filter/angles.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
@@ -277,6 +278,13 @@ TEST(ZeroCalibration, SaysWhatIsWrongWithItsInput) {
          {0, 14, 0},
          true,
          {"accelerometer y", "outside the small-error range", "level first"}},
+        {"radians",
+         [](Increment& in, int) { in.azimuth_rad *= vibrig::estimator::kRadPerDeg; },
+         1,
+         0,
+         five,
+         true,
+         {"the vertical gyro turns by 5", "times the azimuth read-out", "or of the read-out"}},
         {"nan",
          [](Increment& in, int k) {
              if (k == 3000) in.velocity_mps[1] = kNaN;
