@@ -1,5 +1,7 @@
 #include "daemon/archive/trend.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -228,6 +230,19 @@ Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simul
     trend.of_other_vibration = others.size();
     name_outliers(trend);
     return trend;
+}
+
+std::string vibration_words(const Trend& trend) {
+    if (trend.vibrations.empty()) return {};
+    const bool alone = trend.vibrations.contains(vibration_text(kAtNoFrequency));
+    std::string words =
+        fmt::format("quadratic coefficients: {}{}", fmt::join(trend.vibrations, ", "),
+                    alone ? ", which are compared with none" : "");
+    if (trend.of_other_vibration > 0)
+        words += fmt::format("; those of {} campaigns {}({}) left out", trend.of_other_vibration,
+                             alone ? "" : "of another vibration ",
+                             fmt::join(trend.other_vibrations, ", "));
+    return words;
 }
 
 std::vector<Moved> moved(const Entry& campaign, const std::vector<Entry>& history) {

@@ -61,6 +61,10 @@ struct Trend {
 [[nodiscard]] Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h, bool simulated,
                              const Coefficients& like = {});
 
+/// Of which vibration quadratic coefficients are, and how many campaigns are left out for that;
+/// empty: there are none.
+[[nodiscard]] std::string vibration_words(const Trend& trend);
+
 /// Analysis of variance of values with known standard uncertainties in groups: within the groups
 /// against the uncertainties, and between the groups against within (or the uncertainties, where no
 /// group has two).

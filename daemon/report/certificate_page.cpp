@@ -51,7 +51,7 @@ void add_who(Page& page, const Json& c) {
 std::string vibration_of(const Json& result) {
     const Json hz = result.value("at_hz", Json());
     if (result.value("unit", "") != "deg/h/g^2") return "any";
-    if (!hz.is_number()) return "not stated";
+    if (!hz.is_number()) return "no single frequency";
     return hz == 0 ? "static" : fmt::format("{:g} Hz", hz.get<double>());
 }
 

@@ -1,4 +1,6 @@
 // vibrig report and vibrig compensate.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -431,7 +433,9 @@ int compensate(const CompensateArguments& arguments) {
     } else {
         proto::write_output(arguments.output, text);
     }
-    std::cerr << "verdict: " << verdict.sentence << '\n';
+    // On a terminal it stands in what was just printed.
+    if (!arguments.output.empty() || isatty(STDOUT_FILENO) == 0)
+        std::cerr << "verdict: " << verdict.sentence << '\n';
     return all ? exit_status(verdict.level, false) : kNo;
 }
 

@@ -50,23 +50,7 @@ std::string time_axis(const archive::Trend& trend) {
     return "days since " + iso_text(trend.campaigns.front().started_utc_ns);
 }
 
-std::string joined(const std::set<std::string>& texts) {
-    std::string all;
-    for (const auto& text : texts) all += (all.empty() ? "" : ", ") + text;
-    return all;
-}
-
 }  // namespace
-
-std::string vibration_words(const archive::Trend& trend) {
-    if (trend.vibrations.empty()) return {};
-    std::string words = "quadratic coefficients: " + joined(trend.vibrations);
-    if (trend.of_other_vibration > 0)
-        words += "; those of " + std::to_string(trend.of_other_vibration) +
-                 " campaigns of another vibration (" + joined(trend.other_vibrations) +
-                 ") left out";
-    return words;
-}
 
 Json trend_json(const std::string& serial, const archive::Trend& trend, double shutdown_after_h) {
     Json campaigns = Json::array(), coefficients = Json::array(), outliers = Json::array();

@@ -10,9 +10,6 @@ namespace vibrig::tool {
 [[nodiscard]] nlohmann::ordered_json trend_json(const std::string& serial,
                                                 const archive::Trend& trend,
                                                 double shutdown_after_h);
-/// Of which vibration quadratic coefficients are, and how many campaigns are left out for that;
-/// empty: there are none.
-[[nodiscard]] std::string vibration_words(const archive::Trend& trend);
 [[nodiscard]] std::string trend_table(const std::string& serial, const archive::Trend& trend,
                                       double shutdown_after_h);
 /// One coefficient over the campaigns, as SVG.

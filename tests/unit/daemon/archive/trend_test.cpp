@@ -217,6 +217,21 @@ TEST(Trend, WhatIsNotNotedIsAVibrationOfItsOwn) {
     EXPECT_EQ(found.of_other_vibration, 0U);
 }
 
+TEST(Trend, SaysThatWhatIsOfNoSingleFrequencyIsComparedWithNone) {
+    // GIVEN a unit whose newest campaign was a random one
+    const std::vector<Entry> campaigns{entry_of("1", 0, 1, kU, 15.0),
+                                       entry_of("1", 1, 1, kU, kAtNoFrequency)};
+    const auto found = trend_of(campaigns, kShutdownAfterH, false);
+    EXPECT_EQ(found.coefficients.size(), 12U) << "bias and linear ones";
+    EXPECT_EQ(vibration_words(found),
+              "quadratic coefficients: at no single frequency, which are compared with none; those "
+              "of 2 campaigns (at 15 Hz, at no single frequency) left out");
+    // WHEN a frequency is asked for, that is what is there
+    EXPECT_EQ(vibration_words(trend_of(campaigns, kShutdownAfterH, false, all_at(15))),
+              "quadratic coefficients: at 15 Hz; those of 1 campaigns of another vibration (at no "
+              "single frequency) left out");
+}
+
 TEST(Moved, AnotherFrequencyIsNoChangeOfTheUnitAndAChangeAtTheSameIs) {
     std::mt19937 random(kSeed);
     auto history =

@@ -103,6 +103,9 @@ TEST_F(Certificate, OverFrequencySaysOfWhichVibrationACoefficientIs) {
          {"<th>vibration</th>", "<td>deg/h</td><td>any</td>", "<td>deg/h/g^2</td><td>static</td>",
           "<td>deg/h/g^2</td><td>15.1 Hz</td>", "do not give the drift under a vibration"})
         EXPECT_THAT(page, HasSubstr(words));
+    // A compromise between frequencies at which they differ is at none of them.
+    result_["parameters"][14]["at_hz"] = nullptr;
+    EXPECT_THAT(certificate_page(made()), HasSubstr("<td>deg/h/g^2</td><td>no single frequency"));
     // Flat, and nothing against it: of all frequencies.
     result_["spectrum"] = {{"model", "flat"}, {"refusal", nullptr}, {"flat", {{"alarm", false}}}};
     EXPECT_THAT(certificate_page(made()), HasSubstr("that depend on them were not found"));
