@@ -432,7 +432,12 @@ Hypothesis read_hypothesis(const nlohmann::json& from) {
 Model read_model(const nlohmann::json& root, const std::string& path) {
     if (!root.is_object())
         throw std::runtime_error(path + ": expected the JSON of vibrig identify --json");
-    const nlohmann::json& spectrum = member(root, "spectrum", path + ": ");
+    if (!root.contains("spectrum"))
+        refuse(
+            path + ": spectrum", "nothing",
+            "a result over frequency: of a table of samples (CSV), or of a campaign with several "
+            "frequencies (at the one of a campaign vibrig compensate has the drift)");
+    const nlohmann::json& spectrum = root["spectrum"];
     const std::string place = path + ": spectrum.";
     Model model;
     const auto& mixture = list_of(member(spectrum, "mixture", place), 3, place + "mixture");
@@ -453,13 +458,12 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
 }
 
 ResultVerdict read_verdict(const nlohmann::json& root, const std::string& path) {
-    const auto found = root.find("verdict");
-    if (found == root.end() || found->is_null()) return {};
+    const auto& verdict = member(root, "verdict", path + ": ");
     const std::string place = path + ": verdict.";
-    const auto& level = member(*found, "level", place);
+    const auto& level = member(verdict, "level", place);
     if (level != 0 && level != 1 && level != 2)
         refuse(place + "level", shown(level), "0 (valid), 1 (doubtful) or 2 (not valid)");
-    const auto& sentence = member(*found, "sentence", place);
+    const auto& sentence = member(verdict, "sentence", place);
     if (!sentence.is_string()) refuse(place + "sentence", shown(sentence), "a text");
     return {level == 1, level == 2,
             proto::printable(sentence.get<std::string>(), kLongestSentence)};

@@ -35,6 +35,46 @@ TEST_F(Predict, AResultThatIsNotValidForetellsNothing) {
     EXPECT_THAT(run(command).error, HasSubstr("moon.json: verdict.level: found \"2\", expected 0"));
 }
 
+TEST_F(Predict, AResultThatSaysNothingOfItselfForetellsNothing) {
+    PredictJson of = result();
+    of.erase("verdict");
+    write("mute.json", of.dump());
+    const std::string command = "predict mute.json --profile sine.json --attitude 0,0,0";
+    EXPECT_EQ(run(command).exit_code, 2);
+    EXPECT_THAT(run(command).error, HasSubstr("mute.json: verdict: found nothing, expected"));
+    // What a campaign at one frequency gives is no other program's.
+    of = result();
+    of.erase("spectrum");
+    write("mute.json", of.dump());
+    EXPECT_THAT(run(command).error,
+                HasSubstr("mute.json: spectrum: found nothing, expected a result over frequency"));
+}
+
+TEST_F(Predict, OfASimulatedRigItSaysSo) {
+    const std::string command = " --profile sine.json --attitude 0,0,0";
+    EXPECT_THAT(run("predict result.json" + command).out, ::testing::StartsWith("SIMULATED: "));
+    EXPECT_EQ(run("predict result.json --json" + command).json()["simulated"], true);
+    PredictJson real = result();
+    real["simulated"] = false;
+    write("real.json", real.dump());
+    EXPECT_THAT(run("predict real.json" + command).out, ::testing::StartsWith("55 Hz: "));
+    // Also where what is to prove it is simulated.
+    const Ended held = run("predict real.json --verify held_out.csv --config held.toml" + command);
+    EXPECT_THAT(held.out, ::testing::StartsWith("SIMULATED: ")) << held.error;
+}
+
+TEST_F(Predict, ARecordingThatItsConfigurationDoesNotFitProvesNothing) {
+    write("off.toml",
+          "[vibration]\nfrequency_hz = 55.0\n[platform]\nencoder_zero_deg = [1, 0, 0]\n");
+    const Ended ended =
+        run("predict result.json --profile sine.json --verify held_out.csv --config off.toml "
+            "--json");
+    EXPECT_EQ(ended.exit_code, 1) << ended.error;
+    EXPECT_THAT(
+        ended.json()["prediction"]["note"].dump(),
+        HasSubstr("held_out.csv: the configuration does not fit the recording: mean force"));
+}
+
 /// Else the drift is predicted for the other place, without a word.
 TEST_F(Predict, WhereAProfileHoldsIsSaidOnce) {
     write("flat.json", R"({"name": "flat", "psd": [[20, 0.01], [120, 0.01]], "at": "platform"})");
