@@ -150,6 +150,10 @@ void CampaignDwells::tell_verdict(const Judged& judged, campaign::Campaign& camp
         if (std::ranges::all_of(r.residual, known) && std::ranges::all_of(r.residual_sigma, known))
             residuals->push_back({r.run, r.position, r.time_h, r.residual, r.residual_sigma});
     }
+    auto coefficients =
+        std::make_shared<std::array<VerdictStatus::Coefficient, estimator::kParameters>>();
+    for (std::size_t i = 0; i < coefficients->size(); ++i)
+        (*coefficients)[i] = {assessed.coefficients[i].value, assessed.coefficients[i].u};
     const std::lock_guard lock(mutex_);
     verdict_ = {static_cast<std::uint32_t>(assessed.rates.size()),
                 static_cast<int>(verdict.level),
@@ -157,7 +161,8 @@ void CampaignDwells::tell_verdict(const Judged& judged, campaign::Campaign& camp
                 verdict.sentence,
                 assessed.widening,
                 concluding_,
-                std::move(residuals)};
+                std::move(residuals),
+                std::move(coefficients)};
 }
 
 }  // namespace vibrig

@@ -405,7 +405,7 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
     } else if (path == "/api/v1/stream") {
         return problem(426, "this path takes a WebSocket");
     } else if (path == "/api/v1/parameters") {
-        answer.body = parameters_json(source_.result());
+        answer.body = parameters_json(source_.result(), source_.status().verdict);
     } else if (path == "/api/v1/campaign") {
         answer.body = campaign_json(source_.status());
     } else if (path == "/api/v1/unit") {

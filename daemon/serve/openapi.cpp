@@ -116,8 +116,9 @@ constexpr const char* kHistoryParameters =
 constexpr std::array<Path, 14> kPaths{{
     {"/api/v1/status", "The whole status.", "application/json", "Status"},
     {"/api/v1/parameters",
-     "The result so far: 30 coefficients with their covariance, both of the filter's noise alone. "
-     "Uncertainties (u) are in the result of a campaign that has ended.",
+     "The result so far: 30 coefficients with their covariance, both of the filter's noise alone; "
+     "under `assessed` with their uncertainties (u), as a result has them, once there are dwells "
+     "enough.",
      "application/json", "Parameters"},
     {"/api/v1/campaign", "The campaign's part of the status.", "application/json", "Campaign"},
     {"/api/v1/events", "What happened, oldest first.", "application/json", "Events",

@@ -105,9 +105,9 @@ std::string campaign_json(const StatusData& status) {
     return with_dwells(message, message);
 }
 
-std::string parameters_json(const estimator::Result& result) {
+std::string parameters_json(const estimator::Result& result, const VerdictStatus& verdict) {
     v1::Parameters message;
-    fill(message, result);
+    fill(message, result, verdict);
     return to_json(message);
 }
 

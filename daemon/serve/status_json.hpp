@@ -12,7 +12,8 @@ namespace vibrig::serve {
 
 [[nodiscard]] std::string status_json(const StatusData& status);
 [[nodiscard]] std::string campaign_json(const StatusData& status);
-[[nodiscard]] std::string parameters_json(const estimator::Result& result);
+[[nodiscard]] std::string parameters_json(const estimator::Result& result,
+                                          const VerdictStatus& verdict);
 [[nodiscard]] std::string surface_json(const NoiseStatus& noise);
 [[nodiscard]] std::string events_json(const std::string& instance,
                                       const std::vector<EventRecord>& events);

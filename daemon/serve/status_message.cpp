@@ -377,7 +377,26 @@ void fill(v1::Status& out, const StatusData& status) {
     latency.set_sum_ms(status.latency.sum_ms);
 }
 
-void fill(v1::Parameters& out, const estimator::Result& result) {
+namespace {
+
+void fill(v1::Assessed& out, const VerdictStatus& verdict) {
+    out.set_dwells(verdict.dwells);
+    out.set_verdict(verdict.word);
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        v1::Assessed::Coefficient& to = *out.add_parameters();
+        to.set_name(estimator::parameter_names()[i]);
+        to.set_unit(estimator::parameter_unit(i));
+        const auto& [value, u] = (*verdict.coefficients)[i];
+        if (!std::isfinite(u)) continue;
+        set(to, &v1::Assessed::Coefficient::set_value, value);
+        set(to, &v1::Assessed::Coefficient::set_u, u);
+    }
+}
+
+}  // namespace
+
+void fill(v1::Parameters& out, const estimator::Result& result, const VerdictStatus& verdict) {
+    if (verdict.coefficients) fill(*out.mutable_assessed(), verdict);
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         fill_parameter(*out.add_parameters(), i, result.value[i], result.sigma[i],
                        result.observable[i]);

@@ -27,7 +27,7 @@ void fill_values(google::protobuf::Message& out, std::string_view part, const St
 /// Part of it: the newest loop check and safe-state proof.
 void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
-void fill(v1::Parameters& out, const estimator::Result& result);
+void fill(v1::Parameters& out, const estimator::Result& result, const VerdictStatus& verdict);
 void fill(v1::Verdict& out, const StatusData& status);
 void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);

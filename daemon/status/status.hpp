@@ -156,6 +156,11 @@ struct VerdictStatus {
         std::array<double, 3> value{}, sigma{};
     };
     std::shared_ptr<const std::vector<Residual>> residuals = {};  ///< null: none
+    /// As in the result, in the order of parameter_names(); not finite: not determined.
+    struct Coefficient {
+        double value = 0, u = 0;
+    };
+    std::shared_ptr<const std::array<Coefficient, estimator::kParameters>> coefficients = {};
 };
 
 /// What shakes on a rig with several kinds of vibration: as it is commanded, read back and seen. g

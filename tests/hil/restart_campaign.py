@@ -171,7 +171,8 @@ def noise_in_force(status):
 
 
 def estimates(rig):
-    """The result so far: 30 coefficients and their covariance, as many digits as there are."""
+    """The result so far: 30 coefficients and their covariance, as many digits as there are. What is to be believed of it is
+    judged after each dwell, and so not before the first one of a new life."""
     with socket.socket(socket.AF_UNIX) as link:
         link.settimeout(10)
         link.connect(rig.socket)
@@ -179,7 +180,9 @@ def estimates(rig):
         answer = b""
         while more := link.recv(65536):
             answer += more
-    return json.loads(answer.partition(b"\r\n\r\n")[2])
+    found = json.loads(answer.partition(b"\r\n\r\n")[2])
+    found.pop("assessed", None)
+    return found
 
 
 def noise_goes_on(checks, programs, folder):

@@ -47,7 +47,7 @@ TEST(OpenApi, RequiresWhatIsAlwaysThere) {
         EXPECT_EQ(judge("Status", status_json(status)), "");
         EXPECT_EQ(judge("Campaign", campaign_json(status)), "");
     }
-    EXPECT_EQ(judge("Parameters", parameters_json(full_result())), "");
+    EXPECT_EQ(judge("Parameters", parameters_json(full_result(), full_status().verdict)), "");
     EXPECT_EQ(judge("Events", events_json("", {EventRecord{}})), "");
     EXPECT_EQ(judge("Plan", plan_json({})), "");
     EXPECT_EQ(judge("Surface", surface_json({})), "");

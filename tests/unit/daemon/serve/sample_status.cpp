@@ -212,6 +212,10 @@ StatusData full_status() {
     s.verdict = {28, 1, "doubtful", "doubtful, because the drift walked", 3.5, true};
     s.verdict.residuals = std::make_shared<const std::vector<VerdictStatus::Residual>>(
         1, VerdictStatus::Residual{2, 3, 0.75, {0.001, -0.002, 0.003}, {0.01, 0.02, 0.03}});
+    std::array<VerdictStatus::Coefficient, estimator::kParameters> coefficients{};
+    for (std::size_t i = 0; i < coefficients.size(); ++i)
+        coefficients[i] = {0.5 + static_cast<double>(i), 0.02};
+    s.verdict.coefficients = std::make_shared<const decltype(coefficients)>(coefficients);
     s.noise.angle_in_force_arcsec = 5;
     s.noise.block_s = 1;
     s.noise.dwells = 81;

@@ -116,7 +116,8 @@ TEST(StatusJson, CarriesEveryFieldOfTheParameters) {
     EXPECT_EQ(surface.curves(0).z_deg_h(0), 0.5);
     ASSERT_EQ(surface.curves(0).z_classical_deg_h_size(), 1);
     EXPECT_EQ(surface.curves(0).z_classical_deg_h(0), 0.3);
-    const auto result = parsed<v1::Parameters>(parameters_json(full_result()));
+    const auto result =
+        parsed<v1::Parameters>(parameters_json(full_result(), full_status().verdict));
     std::vector<std::string> empty;
     collect_empty(result, "", empty);
     EXPECT_EQ(empty, std::vector<std::string>{});
@@ -217,16 +218,38 @@ TEST(StatusJson, WritesNullWhereTheCovarianceIsNotDetermined) {
     result.covariance[0].fill(kNaN);
     for (auto& row : result.covariance) row[0] = kNaN;
     result.combinations[0].sigma = kNaN;
-    const std::string json = parameters_json(result);
+    const std::string json = parameters_json(result, {});
     EXPECT_FALSE(carries(json, "NaN")) << json;
     EXPECT_TRUE(carries(json, "[null,1,0")) << json.substr(0, 6000);
 }
 
+TEST(StatusJson, UncertaintiesStandBesideWhatTheFilterHas) {
+    // GIVEN an assessment that does not determine the second coefficient
+    VerdictStatus verdict = full_status().verdict;
+    auto coefficients = *verdict.coefficients;
+    coefficients[1] = {kNaN, kNaN};
+    verdict.coefficients = std::make_shared<const decltype(coefficients)>(coefficients);
+    // THEN its values and u are apart from the filter's, with the dwells that they rest on
+    const auto all = parsed<v1::Parameters>(parameters_json(full_result(), verdict));
+    EXPECT_EQ(all.assessed().dwells(), verdict.dwells);
+    EXPECT_EQ(all.assessed().verdict(), verdict.word);
+    ASSERT_EQ(all.assessed().parameters_size(), 30);
+    EXPECT_EQ(all.assessed().parameters(0).name(), "D_Fx");
+    EXPECT_EQ(all.assessed().parameters(0).value(), 0.5);
+    EXPECT_EQ(all.assessed().parameters(0).u(), 0.02);
+    EXPECT_EQ(all.assessed().parameters(0).unit(), "deg/h");
+    EXPECT_FALSE(all.assessed().parameters(1).has_value());
+    EXPECT_FALSE(all.assessed().parameters(1).has_u());
+    EXPECT_NE(all.parameters(0).value(), 0.5);
+    // and before there is one, nothing is in its place
+    EXPECT_FALSE(parsed<v1::Parameters>(parameters_json(full_result(), {})).has_assessed());
+}
+
 TEST(StatusJson, OfARunAtRestAndOfNoSampleThereIsNoNumber) {
     estimator::Result result;
-    EXPECT_FALSE(parsed<v1::Parameters>(parameters_json(result)).has_nis());
+    EXPECT_FALSE(parsed<v1::Parameters>(parameters_json(result, {})).has_nis());
     result.amplitudes.push_back({2, 0, 1, 0, 0});
-    const auto run = parsed<v1::Parameters>(parameters_json(result)).amplitudes(0);
+    const auto run = parsed<v1::Parameters>(parameters_json(result, {})).amplitudes(0);
     EXPECT_TRUE(run.has_amplitude_g());
     EXPECT_FALSE(run.has_sigma_g());
     EXPECT_FALSE(run.has_frequency_hz());
