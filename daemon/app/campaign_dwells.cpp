@@ -264,15 +264,19 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
                          "result " + assessed.verdict.sentence);
     const std::string mark = marked(campaign.mark());
     std::string text;
+    const auto ended_utc_ns = utc_now();
     {
         const std::lock_guard lock(mutex_);
         if (!mark.empty()) result_.warnings.push_back("campaign marked: " + mark);
         for (const auto& words : judged.contradictions) result_.warnings.push_back(words);
         std::optional<tool::KnownType> type;
         if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
+        const auto& unit = configuration_.paperwork;
+        const tool::CampaignNames names{configuration_.campaign.name, ended_utc_ns, unit.unit_type,
+                                        unit.unit_serial};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
                                  judged.live.get(), judged.spectrum ? &*judged.spectrum : nullptr,
-                                 type ? &*type : nullptr);
+                                 type ? &*type : nullptr, &names);
     }
     StatusData ended;
     campaign.fill(ended, with_.clock.now());
@@ -283,7 +287,7 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
         entry = with_.journal->campaign_ended(name_of(ended.state), ended.reason, text);
     if (with_.recorder)
         with_.recorder->campaign_ended(
-            {name_of(ended.state), ended.reason, mark, text, utc_now(), entry});
+            {name_of(ended.state), ended.reason, mark, text, ended_utc_ns, entry});
 }
 
 estimator::Result CampaignDwells::result() const {

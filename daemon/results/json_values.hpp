@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <ctime>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -17,6 +20,15 @@ using proto::number_or_null;
     auto list = nlohmann::ordered_json::array();
     for (const double value : values) list.push_back(number_or_null(value));
     return list;
+}
+/// "2026-03-01T08:00:00Z"
+[[nodiscard]] inline std::string iso_text(std::int64_t utc_ns) {
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    const std::time_t seconds = utc_ns / kSecond;
+    std::tm fields{};
+    std::array<char, 32> text{};
+    if (gmtime_r(&seconds, &fields) == nullptr) return {};
+    return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &fields)};
 }
 
 }  // namespace vibrig::tool

@@ -142,12 +142,19 @@ Json type_prior(const KnownType& type, const uncertainty::Assessment& assessed) 
     return root;
 }
 
+Json campaign_json(const CampaignNames& of) {
+    return {
+        {"name", of.name},
+        {"ended", of.ended_utc_ns > 0 ? Json(iso_text(of.ended_utc_ns)) : Json(nullptr)},
+        {"unit", {{"type", text_or_null(of.unit_type)}, {"serial", text_or_null(of.unit_serial)}}}};
+}
+
 }  // namespace
 
 std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed,
                         bool simulated, const uncertainty::MonteCarlo* drawn,
                         const dwells::Live* live, const SpectrumResult* spectrum,
-                        const KnownType* type) {
+                        const KnownType* type, const CampaignNames* campaign) {
     Json root;
     root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
@@ -170,6 +177,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     if (live != nullptr) root["identified_anew"] = identified_anew(*live);
     if (spectrum != nullptr) add_spectrum(*spectrum, root);
     if (type != nullptr) root["type_prior"] = type_prior(*type, assessed);
+    if (campaign != nullptr) root["campaign"] = campaign_json(*campaign);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
     root["simulated"] = simulated;

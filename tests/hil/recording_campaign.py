@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 import os
+import pty
 import re
 import resource
 import shutil
@@ -53,6 +54,18 @@ def h5py():
 def offline(rig, *arguments, timeout=120):
     return subprocess.run([rig.program("vibrig"), *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                           timeout=timeout, cwd=rig.folder)
+
+
+def read_all(terminal):
+    """What was written to the other end of a terminal, which is closed."""
+    text = b""
+    try:
+        while more := os.read(terminal, 65536):
+            text += more
+    except OSError:   # so Linux says that nobody is there any more
+        pass
+    os.close(terminal)
+    return text.decode()
 
 
 def begin(checks, rig):
@@ -270,6 +283,7 @@ def complete(checks, rig):
     checks.check(recorder["good"] and all(r.number(recorder.get(k, 0)) == 0 for k in
                                           ("samples_lost", "frames_lost", "gaps", "frames_dropped")),
                  "nothing is lost on the way to the disk", str(recorder))
+    assessed = rig.ask("/api/v1/parameters").get("assessed", {})
     rig.daemon.end()
     folder, path = folders(rig)[-1], os.path.join(folders(rig)[-1], "campaign.h5")
     _, result = rig.result()
@@ -279,7 +293,7 @@ def complete(checks, rig):
         checks.check(all(u in (b"ns", "ns", b"rad", "rad", b"g", "g") for u in units.values()), "with their units",
                      str(units))
         last = file["dwells/value"][-1]
-        stored = file["result"][()]
+        stored, ended_s = file["result"][()], int(file.attrs["ended_utc_ns"]) // 10**9
     stored = stored.decode() if isinstance(stored, bytes) else stored
     checks.equal(stored, result.decode().strip(), "the result in the file is result.json")
     for parameter, value in zip(json.loads(result)["parameters"], last):
@@ -289,6 +303,13 @@ def complete(checks, rig):
             break
     else:
         checks.check(True, "estimates after the last dwell are the result's")
+    checks.equal([(p["name"], p.get("value"), p.get("u")) for p in assessed.get("parameters", [])],
+                 [(p["name"], p["value"], p["u"]) for p in json.loads(result)["parameters"]], "the API had value and u of the result")
+    checks.equal((assessed.get("dwells"), assessed.get("verdict")),
+                 (len(json.loads(result)["dwell_rates"]), json.loads(result)["verdict"]["word"]), "with dwells and verdict")
+    checks.equal(json.loads(result).get("campaign"),
+                 {"name": "recorded", "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(ended_s)),
+                  "unit": {"type": "GP-3", "serial": "0017"}}, "result.json names campaign, end and unit")
     replayed = offline(rig, "replay", path, "--json")
     checks.equal(replayed.stdout.strip(), result.decode().strip(), "a replay gives result.json to the last bit")
     from_frames = offline(rig, "replay", *r.raw_logs(folder), "--json")
@@ -605,6 +626,12 @@ def report(checks, rig, folder):
                  any("at 45, 0, 90 deg with 6 g peak" in row for row in comments) and
                  len([row for row in comments if "1 sigma" in row]) == 3 and len(rows) == len(comments) + 31,
                  "as CSV it says the axes and what is predicted", "\n".join(rows[:8]))
+    ours, terminal = pty.openpty()
+    said = subprocess.run([rig.program("vibrig"), "compensate", folder], stdin=subprocess.DEVNULL, stdout=terminal,
+                          stderr=terminal, timeout=120)
+    os.close(terminal)
+    shown = read_all(ours)
+    checks.check(said.returncode == 1 and shown.count("verdict: ") == 1, "on a terminal it says the verdict once", shown)
     header = offline(rig, "compensate", folder, "--to", "c")
     checks.check(header.returncode == 2 and "not determined" in header.stderr, "a C header needs all 30", header.stderr)
     # It is identified anew: what somebody wrote into the file as estimates is not believed.

@@ -43,9 +43,10 @@ int run(const IdentifyOptions& options) {
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
+    const auto* campaign = identified.campaign ? &*identified.campaign : nullptr;
     const auto* live = identified.live ? &*identified.live : nullptr;
     std::cout << (options.json ? result_json(identified.result, assessed, identified.simulated,
-                                             check, live, spectrum) +
+                                             check, live, spectrum, nullptr, campaign) +
                                      "\n"
                                : simulated_line(identified.simulated) +
                                      result_table(identified.result, assessed) +

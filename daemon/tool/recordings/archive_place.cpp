@@ -151,9 +151,4 @@ std::int64_t utc_of(const std::string& option, const std::string& text) {
 }
 
 std::string minute_text(std::int64_t utc_ns) { return report::utc_text(utc_ns).substr(0, 16); }
-std::string iso_text(std::int64_t utc_ns) {
-    const std::string text = report::utc_text(utc_ns);
-    return text.substr(0, 10) + "T" + text.substr(11, 8) + "Z";
-}
-
 }  // namespace vibrig::tool

@@ -37,7 +37,5 @@ struct Whereabouts {
 [[nodiscard]] std::int64_t utc_of(const std::string& option, const std::string& text);
 /// "2026-03-01 08:00"
 [[nodiscard]] std::string minute_text(std::int64_t utc_ns);
-/// "2026-03-01T08:00:00Z"
-[[nodiscard]] std::string iso_text(std::int64_t utc_ns);
 
 }  // namespace vibrig::tool

@@ -271,7 +271,7 @@ nlohmann::ordered_json certificate_for(const record::Campaign& campaign, const I
                             record::shaken_of(campaign, rig));
     const std::string contradiction =
         doubt_replayed(rig.estimator, replayed, found.assessed.verdict);
-    const std::string text = replayed_json(replayed, found, rig.estimator, campaign.head.simulated);
+    const std::string text = replayed_json(campaign, replayed, found, rig.estimator);
     auto certificate =
         report::certificate_of(campaign, nlohmann::ordered_json::parse(text), replayed, issue);
     const std::string difference = result_difference(campaign.result_json, text);

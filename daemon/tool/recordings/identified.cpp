@@ -469,22 +469,20 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     return found;
 }
 
-Found identify_campaign(const std::string& path, const std::string& config,
-                        estimator::Settings& settings, bool& simulated,
-                        std::optional<dwells::Live>& live) {
+Found identify_campaign(const std::string& path, const std::string& config, Identified& to) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
     const auto rig = config.empty() ? report::configuration_of(campaign)
                                     : configuration::load(config, false).configuration;
-    settings = rig.estimator;
-    simulated = campaign.head.simulated;
+    to.simulated = campaign.head.simulated;
+    to.campaign = names_of(campaign);
     if (campaign.found) {
-        live = {*campaign.found, record::live_result(campaign, settings), {}};
-        live->assessed = estimator::uncertainty::assess(settings, live->result);
+        to.live = {*campaign.found, record::live_result(campaign, rig.estimator), {}};
+        to.live->assessed = estimator::uncertainty::assess(rig.estimator, to.live->result);
     }
-    settings = dwells::Anew::settings_of(settings, campaign.found);
-    Found found = identify(campaign, settings);
+    to.settings = dwells::Anew::settings_of(rig.estimator, campaign.found);
+    Found found = identify(campaign, to.settings);
     found.shaken = record::shaken_of(campaign, rig);
     return found;
 }
@@ -515,8 +513,7 @@ Identified identify_recording(const std::string& file, const std::string& config
     Identified identified;
     Found found;
     if (is_campaign(file)) {
-        found = identify_campaign(file, config, identified.settings, identified.simulated,
-                                  identified.live);
+        found = identify_campaign(file, config, identified);
     } else {
         const auto loaded = configuration::load(config, false);
         identified.settings = loaded.configuration.estimator;

@@ -6,6 +6,7 @@
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/dwells/live.hpp"
+#include "daemon/results/result_json.hpp"
 #include "daemon/results/spectrum_result.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
@@ -21,6 +22,7 @@ struct Identified {
     estimator::Result result;
     estimator::uncertainty::Assessment assessed;
     bool simulated = false;                  ///< the rig was a program
+    std::optional<CampaignNames> campaign;   ///< of a recorded one
     std::optional<dwells::Live> live;        ///< of a campaign that was identified anew at its end
     std::optional<SpectrumResult> spectrum;  ///< of rows enough, and of a campaign frequencies
     /// Dwells of a campaign planned for verification; all of a recording that is held out as a

@@ -84,14 +84,14 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     }
     // Without words about it, what the recorder left beside the logs.
     const fs::path folder = fs::path(first).parent_path();
-    std::string configuration, dbc, mark;
+    std::string configuration, dbc;
+    record::Campaign beside;
     const auto parts = record::part_files(folder.empty() ? "." : folder.string());
     if (!parts.empty()) {
         try {
-            const auto beside = record::read_part_head(parts.rbegin()->second);
+            beside = record::read_part_head(parts.rbegin()->second);
             configuration = beside.head.configuration;
             dbc = beside.head.dbc;
-            mark = beside.mark;
         } catch (const std::exception& error) {
             if (arguments.config.empty())
                 throw std::runtime_error(std::string(error.what()) +
@@ -108,7 +108,9 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     const std::string dwells =
         arguments.dwells.empty() ? (folder / "dwells.csv").string() : arguments.dwells;
     auto campaign = record::campaign_from_candump(arguments.files, dwells, configuration, dbc);
-    campaign.mark = mark;
+    campaign.head.name = beside.head.name;
+    campaign.ended_utc_ns = beside.ended_utc_ns;
+    campaign.mark = beside.mark;
     return campaign;
 }
 
@@ -219,7 +221,7 @@ int replay(const ReplayArguments& arguments) {
     if (!arguments.plot.empty())
         report::plot_result(arguments.plot, replayed.result, assessed, simulated);
     std::cout << (arguments.json
-                      ? printed_json(replayed, replayed_json(replayed, found, settings, simulated),
+                      ? printed_json(replayed, replayed_json(campaign, replayed, found, settings),
                                      difference, same_build) +
                             "\n"
                       : simulated_line(simulated) + result_table(replayed.result, assessed) +

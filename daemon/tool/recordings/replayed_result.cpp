@@ -5,28 +5,35 @@
 
 #include "daemon/dwells/live.hpp"
 #include "daemon/record/campaign_file.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/results/result_difference.hpp"
-#include "daemon/results/result_json.hpp"
 #include "estimator/commissioning/contradiction.hpp"
 #include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::tool {
 
-std::string replayed_json(const record::ReplayResult& replayed, const Assessed& found,
-                          const estimator::Settings& settings, bool simulated) {
+CampaignNames names_of(const record::Campaign& campaign) {
+    const auto unit = report::paperwork_of(campaign);
+    return {campaign.head.name, campaign.ended_utc_ns, unit.unit_type, unit.unit_serial};
+}
+
+std::string replayed_json(const record::Campaign& campaign, const record::ReplayResult& replayed,
+                          const Assessed& found, const estimator::Settings& settings) {
     std::optional<dwells::Live> live;
     if (replayed.found)
         live = {*replayed.found, replayed.live,
                 estimator::uncertainty::assess(settings, replayed.live)};
-    return result_json(replayed.result, found.assessed, simulated, nullptr, live ? &*live : nullptr,
-                       found.spectrum ? &*found.spectrum : nullptr);
+    const CampaignNames names = names_of(campaign);
+    return result_json(replayed.result, found.assessed, campaign.head.simulated, nullptr,
+                       live ? &*live : nullptr, found.spectrum ? &*found.spectrum : nullptr,
+                       nullptr, &names);
 }
 
 std::string not_as_recorded(const record::Campaign& campaign, const record::ReplayResult& replayed,
                             const Assessed& found, const estimator::Settings& settings) {
     if (campaign.state != "finished" || campaign.result_json.empty()) return {};
     return result_difference(campaign.result_json,
-                             replayed_json(replayed, found, settings, campaign.head.simulated));
+                             replayed_json(campaign, replayed, found, settings));
 }
 
 std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,

@@ -3,13 +3,18 @@
 #include <string>
 
 #include "daemon/record/replay.hpp"
+#include "daemon/results/result_json.hpp"
 #include "daemon/results/spectrum_result.hpp"
 
 namespace vibrig::tool {
 
+/// Of which campaign and unit a recording is.
+[[nodiscard]] CampaignNames names_of(const record::Campaign& campaign);
+
 /// What a replay gives, as the daemon writes it into the recording.
-[[nodiscard]] std::string replayed_json(const record::ReplayResult& replayed, const Assessed& found,
-                                        const estimator::Settings& settings, bool simulated);
+[[nodiscard]] std::string replayed_json(const record::Campaign& campaign,
+                                        const record::ReplayResult& replayed, const Assessed& found,
+                                        const estimator::Settings& settings);
 
 /// In words, where the recording's own result is not what its replay gives; empty: nowhere, or it
 /// is not compared: a campaign that did not finish has one of less than was recorded.

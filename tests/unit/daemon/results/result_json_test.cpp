@@ -58,6 +58,19 @@ TEST(ResultJson, HasTheKeysOfTheContractInOrder) {
                 ElementsAre("run", "amplitude_g", "kappa", "sigma_g", "frequency_hz"));
 }
 
+TEST(ResultJson, SaysOfWhichCampaignAndUnitItIs) {
+    const auto printed = [](const CampaignNames& names) {
+        return Json::parse(result_json(complete(), {}, false, nullptr, nullptr, nullptr, nullptr,
+                                       &names))["campaign"]
+            .dump();
+    };
+    EXPECT_EQ(printed({"night", 1'772'352'000'999'999'999, "GP-3", "0017"}),
+              R"({"name":"night","ended":"2026-03-01T08:00:00Z",)"
+              R"("unit":{"type":"GP-3","serial":"0017"}})");
+    EXPECT_EQ(printed({"night", 0, "", ""}),
+              R"({"name":"night","ended":null,"unit":{"type":null,"serial":null}})");
+}
+
 TEST(ResultJson, NamesTheCoefficientsAsIeee517Does) {
     const Json root = Json::parse(result_json(complete()));
     std::vector<std::string> names;
