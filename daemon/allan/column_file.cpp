@@ -1,10 +1,6 @@
 #include "daemon/allan/column_file.hpp"
 
-#include <unistd.h>
-#include <zlib.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -14,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/allan/packed_input.hpp"
 #include "proto/open_end.hpp"
 #include "proto/text.hpp"
 
@@ -186,21 +183,14 @@ class Parser {
     bool known_ = false;
 };
 
-struct CloseGz {
-    void operator()(gzFile_s* file) const { gzclose(file); }
-};
-
-std::unique_ptr<gzFile_s, CloseGz> open(const std::string& path) {
-    errno = 0;
-    // zlib passes a file that is not gzip through unchanged.
-    std::unique_ptr<gzFile_s, CloseGz> file(path == "-" ? gzdopen(dup(STDIN_FILENO), "rb")
-                                                        : gzopen(path.c_str(), "rb"));
-    if (!file) {
-        throw std::runtime_error(path +
-                                 ": cannot be read: " + std::generic_category().message(errno));
+/// What `act` gives; an error with the file's name before it.
+template <class Act>
+auto reading(const std::string& path, const Act& act) {
+    try {
+        return act();
+    } catch (const std::runtime_error& error) {
+        throw std::runtime_error(path + ": cannot be read: " + error.what());
     }
-    gzbuffer(file.get(), kChunk);
-    return file;
 }
 
 }  // namespace
@@ -234,21 +224,14 @@ ColumnFile read_columns(const std::string& path, const ColumnRequest& request,
         throw std::runtime_error(path + ": is a folder, expected a file");
     }
     const std::uintmax_t bytes = path == "-" ? 0 : std::filesystem::file_size(path, no_size);
-    const auto file = open(path);
+    const auto file = reading(path, [&] { return std::make_unique<PackedInput>(path); });
     Parser parser(path, request);
     std::vector<char> buffer(kChunk + kLongestLine);
     std::size_t kept = 0;
     for (;;) {
-        const int got = gzread(file.get(), buffer.data() + kept, static_cast<unsigned>(kChunk));
-        int code = 0;
-        const char* why = gzerror(file.get(), &code);
-        if (got < 0 || (got == 0 && code == Z_BUF_ERROR)) {
-            throw std::runtime_error(path + ": cannot be read: " +
-                                     (code == Z_BUF_ERROR ? "compressed data end too early"
-                                      : code == Z_ERRNO   ? std::generic_category().message(errno)
-                                                          : std::string(why)));
-        }
-        const std::string_view text(buffer.data(), kept + static_cast<std::size_t>(got));
+        const std::size_t got =
+            reading(path, [&] { return file->read(buffer.data() + kept, kChunk); });
+        const std::string_view text(buffer.data(), kept + got);
         std::size_t begin = 0;
         for (std::size_t end = text.find('\n'); end != std::string_view::npos;
              end = text.find('\n', begin)) {
@@ -268,8 +251,7 @@ ColumnFile read_columns(const std::string& path, const ColumnRequest& request,
         }
         std::copy(text.begin() + static_cast<std::ptrdiff_t>(begin), text.end(), buffer.begin());
         if (progress) {
-            progress(static_cast<std::size_t>(std::max<z_off_t>(0, gzoffset(file.get()))),
-                     no_size ? 0 : static_cast<std::size_t>(bytes));
+            progress(file->taken(), no_size ? 0 : static_cast<std::size_t>(bytes));
         }
     }
 }

@@ -113,6 +113,37 @@ TEST_F(AllanCommand, EveryFormOfInputGivesTheSame) {
     }
 }
 
+TEST_F(AllanCommand, OfAPackedRecordNothingIsLostWithoutAWord) {
+    // GIVEN a record that a logger packed in two goes
+    const auto packed = [this](const std::string& text) {
+        const std::string path = (folder_ / "part.gz").string();
+        gzFile file = gzopen(path.c_str(), "wb");
+        gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+        gzclose(file);
+        std::ifstream in(path, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(in), {});
+    };
+    const std::string first = packed(noise(300, 1)), second = packed(noise(200, 2));
+    write("two.gz", first + second + std::string(512, '\0'));
+    ASSERT_EQ(vibrig("allan two.gz --tau0 0.5 --json"), 0) << error;
+    EXPECT_NE(out.find("\"samples\":500,"), std::string::npos) << out;
+    // WHEN the second is damaged, wherever it is THEN it is refused, not shortened
+    for (const std::size_t at :
+         {std::size_t{0}, std::size_t{1}, second.size() / 2, second.size() - 6}) {
+        std::string damaged = second;
+        damaged[at] = static_cast<char>(damaged[at] ^ 1);
+        write("damaged.gz", first + damaged);
+        expect_refusal("allan damaged.gz --tau0 0.5", {"damaged.gz: cannot be read: "});
+    }
+    write("other.gz", first + "12.5\n");
+    expect_refusal("allan other.gz --tau0 0.5",
+                   {"other.gz: cannot be read: found at byte " + std::to_string(first.size()) +
+                    " what is no compressed data, expected more of them or the end"});
+    write("cut.gz", first + second.substr(0, second.size() - 9));
+    expect_refusal("allan cut.gz --tau0 0.5",
+                   {"cut.gz: cannot be read: compressed data end too early"});
+}
+
 TEST_F(AllanCommand, MissingSamplesAreFoundByNanByEmptyFieldAndByTime) {
     std::string nan;
     std::string time = "t,y\n";
