@@ -15,6 +15,7 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <string_view>
 #include <system_error>
 
 namespace vibrig {
@@ -71,7 +72,11 @@ std::string host_of(std::string host) {
                       NI_NUMERICHOST) == 0)
         host = text.data();
     ::freeaddrinfo(found);
-    return host == "::1" ? "127.0.0.1" : host;
+    // An IPv4 address written as IPv6 leads to the same peer, the unspecified one to this machine.
+    constexpr std::string_view kMapped = "::ffff:";
+    if (host.starts_with(kMapped) && host.find('.') != std::string::npos)
+        host.erase(0, kMapped.size());
+    return host == "::1" || host == "::" || host == "0.0.0.0" ? "127.0.0.1" : host;
 }
 
 int make_socket() {

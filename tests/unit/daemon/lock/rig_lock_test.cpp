@@ -101,12 +101,16 @@ TEST(RigLock, KnowsOneSpellingOfAnAddress) {
     Configuration c;
     c.can.kind = drivers::CanPortSettings::Kind::socketcan;
     c.can.interface = "can0";
-    for (const char* host : {"LocalHost", "127.1", "0:0::1"}) {
+    for (const char* host :
+         {"LocalHost", "127.1", "0:0::1", "::ffff:127.0.0.1", "::ffff:7f00:1", "0.0.0.0", "::"}) {
         c.shaker.host = host;
         const auto all = RigLock::resources(c);
         ASSERT_EQ(all.size(), 3U) << host;
         EXPECT_EQ(all[1], "modbus:127.0.0.1:502") << host;
     }
+    // Of a controller elsewhere the same
+    c.shaker.host = "::FFFF:192.0.2.7";
+    EXPECT_EQ(RigLock::resources(c)[1], "modbus:192.0.2.7:502");
     c.shaker.host = "LocalHost";
     EXPECT_THAT(RigLock::resources(c),
                 ElementsAre("can:can0", "modbus:127.0.0.1:502", "modbus:localhost:502"));
