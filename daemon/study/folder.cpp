@@ -13,6 +13,7 @@
 #include "daemon/study/propagation.hpp"
 #include "daemon/study/recordings.hpp"
 #include "estimator/filter/instruction_set.hpp"
+#include "proto/json_file.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::study {
@@ -87,16 +88,24 @@ std::vector<Recording> recordings_of(const Json& list) {
     return recordings;
 }
 
+/// What of a plan STUDY.toml alone says.
+Json stated_by(const Study& study) {
+    return {{"name", study.name}, {"kind", study.kind},       {"seed", study.seed},
+            {"runs", study.runs}, {"points", study.points()}, {"tasks", study.tasks()}};
+}
+
+Json grid_of(const Study& study) {
+    Json grid = Json::array();
+    for (const Axis& axis : study.grid)
+        grid.push_back({{"key", axis.key}, {"values", axis.values}});
+    return grid;
+}
+
 Json plan_json(const Study& study, const std::string& text, const Checked& checked,
                const std::string& instruction_set) {
     Json plan;
     plan["format"] = kFormat;
-    plan["name"] = study.name;
-    plan["kind"] = study.kind;
-    plan["seed"] = study.seed;
-    plan["runs"] = study.runs;
-    plan["points"] = study.points();
-    plan["tasks"] = study.tasks();
+    plan.update(stated_by(study));
     plan["version"] = VIBRIG_VERSION;
     plan["compiler"] = estimator::compiler();
     plan["instruction_set"] = instruction_set;
@@ -107,15 +116,49 @@ Json plan_json(const Study& study, const std::string& text, const Checked& check
         plan["recordings"] = json_of(study.recordings);
         return plan;
     }
-    Json grid = Json::array();
-    for (const Axis& axis : study.grid)
-        grid.push_back({{"key", axis.key}, {"values", axis.values}});
-    plan["grid"] = grid;
+    plan["grid"] = grid_of(study);
     plan["sequences"] = checked.sequences;
     Json configuration = Json::object();
     for (const auto& [key, value] : checked.configuration) configuration[key] = value;
     plan["configuration"] = configuration;
     return plan;
+}
+
+constexpr const char* kAsWritten = ", as `vibrig study plan` writes it";
+
+Json read_plan(const std::string& text, const std::string& file) {
+    Json plan;
+    try {
+        plan = proto::parse_json<Json>(text, file,
+                                       "not JSON, expected what `vibrig study plan` writes");
+    } catch (const std::runtime_error& error) {
+        throw StudyError(error.what());
+    }
+    const Json format = plan.is_object() ? plan.value("format", Json()) : Json();
+    if (format != kFormat)
+        throw StudyError(file + ": format: found " + format.dump() + ", expected " +
+                         std::to_string(kFormat));
+    return plan;
+}
+
+std::string text_at(const Json& plan, const char* key, const std::string& file) {
+    const Json found = plan.value(key, Json());
+    if (!found.is_string())
+        throw StudyError(file + ": " + key + ": found " + found.dump().substr(0, 40) +
+                         ", expected a text" + kAsWritten);
+    return found;
+}
+
+/// One that was changed or damaged would be another study's, and every part of this a stranger's.
+void check_plan(const Json& plan, const Folder& folder, const std::string& file) {
+    Json stated = stated_by(folder.study);
+    if (folder.study.kind == "campaigns") stated["grid"] = grid_of(folder.study);
+    for (const auto& [key, expected] : stated.items()) {
+        if (const Json found = plan.value(key, Json()); found != expected)
+            throw StudyError(file + ": " + key + ": found " + found.dump().substr(0, 40) +
+                             ", expected " + expected.dump().substr(0, 40) + ", as " + kStudyFile +
+                             " has it");
+    }
 }
 
 }  // namespace
@@ -165,27 +208,25 @@ Folder open_study(const std::string& path) {
                          " in it, expected a folder that `vibrig study "
                          "plan STUDY.toml -o " +
                          path + "` made");
-    const std::string text = read_text(path + "/" + kPlanFile, kLargestPlan);
-    std::string digest;
+    const std::string plan_path = path + "/" + kPlanFile;
+    const std::string text = read_text(plan_path, kLargestPlan);
+    const Json plan = read_plan(text, plan_path);
+    out.version = text_at(plan, "version", plan_path);
+    out.compiler = text_at(plan, "compiler", plan_path);
+    out.instruction_set = text_at(plan, "instruction_set", plan_path);
+    out.arithmetic = text_at(plan, "arithmetic", plan_path);
+    const bool campaigns = text_at(plan, "kind", plan_path) == "campaigns";
+    std::string digest, key = "inputs";
     std::vector<Recording> recordings;
     try {
-        const Json plan = Json::parse(text);
-        if (plan.at("format") != kFormat)
-            throw StudyError(path + ": format " + plan.at("format").dump() + ", expected " +
-                             std::to_string(kFormat));
-        out.version = plan.at("version");
-        out.compiler = plan.at("compiler");
-        out.instruction_set = plan.at("instruction_set");
-        out.arithmetic = plan.at("arithmetic");
-        if (plan.at("kind") != "campaigns") {
-            recordings = recordings_of(plan.at("recordings"));
-        } else {
-            out.sequences = plan.at("sequences").get<Sequences>();
-        }
         digest = plan.at("inputs").at(0).at("sha256");
-    } catch (const Json::exception& error) {
-        throw StudyError(path + "/" + kPlanFile +
-                         ": not what `vibrig study plan` writes: " + error.what());
+        key = campaigns ? "sequences" : "recordings";
+        if (campaigns) out.sequences = plan.at(key).get<Sequences>();
+        if (!campaigns) recordings = recordings_of(plan.at(key));
+    } catch (const Json::exception&) {
+        throw StudyError(plan_path + ": " + key + ": found " +
+                         (plan.contains(key) ? plan[key].dump().substr(0, 40) : "nothing") +
+                         ", expected it" + kAsWritten);
     }
     const std::string study_path = path + "/" + kStudyFile;
     const std::string study_text = read_text(study_path, kLargestFile);
@@ -196,6 +237,7 @@ Folder open_study(const std::string& path) {
     out.study = parse_study(study_text, study_path);
     if (out.study.kind == "recordings") out.study.runs = recordings.size();
     out.study.recordings = std::move(recordings);
+    check_plan(plan, out, plan_path);
     out.id_text = record::sha256_of_text(text);
     out.id = id_of(out.id_text);
     return out;

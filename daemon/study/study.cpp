@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -14,6 +15,7 @@
 #include "daemon/configuration/value.hpp"
 #include "daemon/study/rig_keys.hpp"
 #include "daemon/study/toml_text.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::study {
 
@@ -111,8 +113,10 @@ class Reader {
             const std::string name(key.str());
             if (name == "name") {
                 study_.name = node.value_or(std::string());
-                if (study_.name.empty() || study_.name.size() > 64)
-                    problem(node, "study.name", describe(node), "1 to 64 characters");
+                constexpr std::size_t kLongestName = 64;
+                if (study_.name.empty() || study_.name.size() > kLongestName ||
+                    proto::printable(study_.name, kLongestName) != study_.name)
+                    problem(node, "study.name", describe(node), "1 to 64 characters on one line");
             } else if (name == "kind") {
                 study_.kind = node.value_or(std::string());
                 if (std::ranges::find(kKinds, study_.kind) == kKinds.end())
@@ -336,6 +340,14 @@ class Reader {
         return fits(table, name, found, out);
     }
 
+    /// Of a normal distribution, without loss of digits at either end.
+    static double share_within(const Distribution& d) {
+        const double low = (d.low - d.first) / (d.second * std::numbers::sqrt2);
+        const double high = (d.high - d.first) / (d.second * std::numbers::sqrt2);
+        return low > 0 ? (std::erfc(low) - std::erfc(high)) / 2
+                       : (std::erfc(-high) - std::erfc(-low)) / 2;
+    }
+
     bool fits(const toml::table& table, const std::string& name, const std::string& found,
               const Distribution& d) {
         const std::string range =
@@ -343,8 +355,8 @@ class Reader {
         if (!std::isfinite(d.first) || !std::isfinite(d.second)) {
             problem(table, name, found, "finite numbers");
         } else if (d.shape == Distribution::Shape::normal) {
-            if (d.second > 0 && d.first + 3 * d.second >= d.low && d.first - 3 * d.second <= d.high)
-                return true;
+            // What is beyond 3 sigma at one side of the range: 1.35 in a thousand. Draws.
+            if (d.second > 0 && share_within(d) >= 0.00134) return true;
             problem(table, name, found,
                     "a sigma above 0, and values from " + range + " not to be too rare");
         } else if (!(d.first < d.second) || d.first < d.low || d.second > d.high) {

@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 
 /// A study of 40 tasks whose results are made up: what is tested is how they are kept.
 class StudyParts : public ::testing::Test {
@@ -318,6 +319,38 @@ TEST_F(StudyParts, OfAStudyThatCannotBeReadNameTheFile) {
     } catch (const StudyError& error) {
         EXPECT_THAT(error.what(), HasSubstr("none.toml: cannot be opened: No such file"));
     }
+}
+
+TEST_F(StudyParts, OfAPlanThatWasChangedAreNotTakenForAnothers) {
+    const std::string path = folder_.path + "/study.json";
+    std::ifstream file(path);
+    const std::string good((std::istreambuf_iterator<char>(file)), {});
+    const auto complaint = [&](const std::string& from, const std::string& to) -> std::string {
+        const auto at = good.find(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        std::ofstream(path) << std::string(good).replace(at, from.size(), to);
+        try {
+            static_cast<void>(open_study(folder_.path));
+        } catch (const StudyError& error) {
+            return error.what();
+        }
+        return "none";
+    };
+    // WHEN what STUDY.toml has stands otherwise in the plan THEN its place, both values are named
+    EXPECT_EQ(complaint("\"seed\": 1", "\"seed\": 3"),
+              path + ": seed: found 3, expected 1, as STUDY.toml has it");
+    EXPECT_EQ(complaint("\"runs\": ", "\"rums\": ").substr(0, path.size() + 32),
+              path + ": runs: found null, expected 20,");
+    EXPECT_THAT(complaint("\"kind\": \"campaigns\"", "\"kind\": \"recordings\""),
+                HasSubstr(path + ": recordings: found nothing, expected it, as"));
+    // AND so is what it needs besides
+    EXPECT_EQ(complaint("\"version\": \"0.1.0\"", "\"version\": null"),
+              path + ": version: found null, expected a text, as `vibrig study plan` writes it");
+    EXPECT_EQ(complaint("\"format\": 1", "\"format\": 2"), path + ": format: found 2, expected 1");
+    EXPECT_THAT(complaint("{", "[{"), StartsWith(path + ": not JSON, expected what `vibrig study "
+                                                        "plan` writes; line "));
+    std::ofstream(path) << good;
+    EXPECT_NO_THROW(static_cast<void>(open_study(folder_.path)));
 }
 
 TEST_F(StudyParts, BelongToAStudyThatIsAsPlanned) {

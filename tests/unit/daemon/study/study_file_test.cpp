@@ -101,6 +101,14 @@ TEST(StudyFile, ThatIsWrongIsNamedByPlaceValueAndWhatWasExpected) {
                            "expected { normal = [MEAN, SIGMA] }, or"));
     EXPECT_THAT(complaint(kHead + "[rig]\n\"noise.resolver_arcsec\" = { normal = [5, 0] }\n"),
                 HasSubstr("expected a sigma above 0"));
+    // A distribution so wide that next to nothing of it lies in the key's range
+    EXPECT_THAT(complaint(kHead + "[rig]\n\"platform.slew_error_deg\" = { normal = [0, 1e300] }\n"),
+                StartsWith("S.toml:5:29: rig.platform.slew_error_deg: found { \"normal\" = [0, "));
+    EXPECT_THAT(complaint(kHead + "[rig]\n\"platform.slew_error_deg\" = { normal = [0, 2000] }\n"),
+                HasSubstr("expected a sigma above 0, and values from 0 to 5 not to be too rare"));
+    EXPECT_THAT(complaint("[study]\nname = \"a\\nb\"\nkind = 'campaigns'\n"),
+                StartsWith("S.toml:2:8: study.name: found \"a\\nb\" (a string), expected 1 to 64 "
+                           "characters on one line"));
     EXPECT_THAT(complaint(kHead + "[rig]\n\"noise.resolver_arcsec\" = { rectangular = [-1, 5] }\n"),
                 HasSubstr("expected LOW below HIGH, both from 0 to 100000"));
     EXPECT_THAT(complaint(kHead + "[rig]\n\"noise.resolver_bits\" = { normal = [20, 1] }\n"),
