@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "daemon/plan/number_table.hpp"
+#include "proto/json_file.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::plan {
@@ -241,13 +242,9 @@ PlanFile runs_from_json(const std::string& text, const std::string& path,
                         const TransmissionAt& transmission, std::optional<double> rig_hz) {
     Json json;
     try {
-        json = Json::parse(text);
-    } catch (const Json::exception& error) {
-        // "[json.exception.parse_error.101] parse error at line 2, column 1: syntax error while .."
-        std::string_view cause = error.what();
-        cause.remove_prefix(cause.find(' ') + 1);
-        throw PlanFileError(path +
-                            ": not JSON: " + proto::printable(cause.substr(0, cause.find(':'))));
+        json = proto::parse_json(text, path, "not JSON, expected a plan");
+    } catch (const std::runtime_error& error) {
+        throw PlanFileError(error.what());
     }
     const auto runs = json.find("runs");
     if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");
