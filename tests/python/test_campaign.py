@@ -150,7 +150,50 @@ def test_what_both_files_have_is_there_once(recording):
 
 def test_older_recordings_have_no_conditions(recording):
     recording.part(1, 0, [1], 1, conditions=False)
-    assert vibrig.open(recording.folder).conditions.rows == 0
+    conditions = vibrig.open(recording.folder).conditions
+    assert conditions.rows == 0
+    assert len(conditions.utc()) == 0 and conditions.utc().dtype == "datetime64[ns]"
+    assert conditions.frame().shape == (0, 0)
+    with pytest.raises(KeyError, match="conditions: found no column 'command_g', expected none: the recording has no such table"):
+        conditions["command_g"]
+
+
+def test_a_mistake_of_the_caller_is_not_the_recordings(campaign):
+    for attitude in ([0, 0, "x"], "abc", None, 3, [[1], [2], [3]], [0, 0], [0, 0, np.nan]):
+        with pytest.raises(ValueError, match="attitude_deg: found .*, expected three angles, deg"):
+            campaign.compensation(attitude)
+    for level in ("9", [9], np.nan, -1, 2000):
+        with pytest.raises(ValueError, match="table_g: found .*, expected 0 to 1000 g"):
+            campaign.compensation([0, 0, 0], table_g=level)
+    with pytest.raises(ValueError, match="platform_g: found 'x', expected 0 to 1000 g"):
+        campaign.compensation([0, 0, 0], platform_g="x")
+    with pytest.raises(KeyError, match="samples: found no column 'foo', expected one of force_g, time_ns"):
+        campaign.samples.utc("foo")
+    with pytest.raises(KeyError, match="samples: found column 'force_g', expected one of times: time_ns"):
+        campaign.samples.utc("force_g")
+    with pytest.raises(IndexError, match="dwell: found 2, expected -2 to 1"):
+        campaign.of_dwell(2)
+    with pytest.raises(FileNotFoundError, match="path: found nothing"):
+        vibrig.open("")
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda f: f.attrs.__setitem__("format_version", 2.5), "attribute format_version: found 2.5, expected one value of its kind"),
+    (lambda f: f.attrs.__setitem__("utc_offset_ns", np.nan), "attribute utc_offset_ns: found nan, expected one value of its kind")])
+def test_attributes_that_lie_are_refused(recording, change, words):
+    path = recording.part(1, 0, [1], 1)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with pytest.raises(vibrig.FormatError, match=words):
+        vibrig.open(path)
+
+
+def test_times_that_go_back_have_no_dwells(recording):
+    path = recording.part(1, 0, [1], 1)
+    with h5py.File(path, "r+") as file:
+        file["samples/time_ns"][50] = 0
+    with pytest.raises(vibrig.FormatError, match="/samples/time_ns: found 0 behind 1225000000 in row 50, expected growing times"):
+        vibrig.open(path).of_dwell(0)
 
 
 def with_quality(path, row, names=None):

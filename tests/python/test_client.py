@@ -52,10 +52,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
             return
         status, body = {"/api/v1/status": (200, {"campaign": {"state": "idle"}}),
                         "/api/v1/plan": (200, [1]),
+                        "/api/v1/selftest": (200, b"<html>another program"),
                         "/api/v1/config": (403, {"title": "Forbidden", "detail": "viewers may not"}),
+                        "/api/v1/history?channel=deaf": (200, {"time_s": "x"}),
                         }.get(self.path, (200, HISTORY))
         self.server.asked.append(self.path)
-        text = json.dumps(body).encode()
+        text = body if isinstance(body, bytes) else json.dumps(body).encode()
         self.send_response(status)
         self.send_header("Content-Length", str(len(text)))
         self.end_headers()
@@ -100,6 +102,10 @@ def test_refusals_have_the_words_of_the_daemon(client):
         client.configuration()
     with pytest.raises(vibrig.Answer, match="found list, expected an object"):
         client.plan()
+    with pytest.raises(vibrig.Answer, match="/api/v1/selftest: found no JSON .*, expected an object"):
+        client.selftest()
+    with pytest.raises(vibrig.Answer, match="/api/v1/history: found {'time_s': 'x'}, expected time_s and channels"):
+        client.history("deaf")
 
 
 def test_the_stream_joins_patches_fragments_and_pings(client, server):
@@ -119,6 +125,8 @@ def test_the_stream_joins_patches_fragments_and_pings(client, server):
 
 @pytest.mark.parametrize("bad, words", [
     (frame("x", mask=True), "expected none from a server"), (b"\x81\x7f" + b"\x00\xff" * 4, "expected at most"),
+    (frame("<html>"), "stream: found '<html>', expected a JSON object with a type"), (frame("[1]"), "stream: found '.1.', expected"),
+    (frame('{"type":"delta"}'), "stream: found .*delta.*, expected a patch"),
     (b"\x81\x05ab", "closed the connection"), (frame(struct.pack("!H", 1001) + b"too slow", 8), "hung up: too slow")])
 def test_a_stream_that_lies_ends(client, server, bad, words):
     server.RequestHandlerClass.frames = bad
@@ -151,7 +159,13 @@ def test_arguments(tmp_path):
         vibrig.Client(host="rig", identity=tmp_path / "wall")
     assert _host_and_port("rig.lab") == ("rig.lab", 8443)
     assert _host_and_port("[fe80::1]:9") == ("fe80::1", 9)
-    for wrong in ("", "rig:port", "rig/x"):
+    for page in ("http://127.0.0.1:99999/", "http://127.0.0.1:x/", "http://[::1/", "http://127.0.0.1:0/", 5):
+        with pytest.raises(ValueError, match="page: found .*, expected an address such as"):
+            vibrig.Client(page=page)
+    for seconds in (-1, 0, float("nan"), "x", 1e300):
+        with pytest.raises(ValueError, match="timeout_s: found .*, expected seconds above 0, 86400 at most"):
+            vibrig.Client(timeout_s=seconds)
+    for wrong in ("", "rig:port", "rig/x", "rig:0"):
         with pytest.raises(ValueError, match="host: found"):
             _host_and_port(wrong)
 

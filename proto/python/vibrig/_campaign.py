@@ -73,7 +73,8 @@ class Table(Mapping[str, npt.NDArray[Any]]):
 
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
         if column not in self.units:
-            raise KeyError(f"{self.name}: found no column {column!r}, expected one of {', '.join(self.units)}")
+            expected = f"one of {', '.join(self.units)}" if self.units else "none: the recording has no such table"
+            raise KeyError(f"{self.name}: found no column {column!r}, expected {expected}")
         if column not in self._read:
             parts = []
             for segment in self._segments:
@@ -103,10 +104,17 @@ class Table(Mapping[str, npt.NDArray[Any]]):
         return int(sum(np.count_nonzero(segment.keep) for segment in self._segments))
 
     def utc(self, column: str = "") -> npt.NDArray[np.datetime64]:
-        """Times of a column as UTC, datetime64[ns]; without a name those of the table's first column of times."""
+        """Times of a column as UTC, datetime64[ns]; without a name those of the table's first column of times, none where the
+        recording has no such table."""
+        if not column and not self.units:
+            return np.zeros(0, dtype="datetime64[ns]")
         column = column or next((name for name in ("time_ns", "from_ns") if name in self.units), "")
+        if column in self.units and column not in TIMES:
+            raise KeyError(f"{self.name}: found column {column!r}, expected one of times: "
+                           f"{', '.join(name for name in self.units if name in TIMES)}")
+        values = self[column]
         with _reading(self._segments[0].path):
-            stamps: npt.NDArray[np.datetime64] = (self[column] + self._utc_offset_ns).astype("datetime64[ns]")
+            stamps: npt.NDArray[np.datetime64] = (values + self._utc_offset_ns).astype("datetime64[ns]")
         return stamps
 
     def frame(self) -> Any:
@@ -225,13 +233,17 @@ class Campaign:
         """
         if table_g is not None and platform_g is not None:
             raise ValueError("table_g: found it beside platform_g, expected one of them")
-        if len(attitude_deg) != 3 or not np.all(np.isfinite(attitude_deg)):
+        attitude = _numbers(attitude_deg)
+        if attitude.shape != (3,) or not np.all(np.isfinite(attitude)):
             raise ValueError(f"attitude_deg: found {attitude_deg!r}, expected three angles, deg")
+        for name, given in (("table_g", table_g), ("platform_g", platform_g)):
+            if given is not None and not (_numbers(given).shape == () and 0 <= _numbers(given) <= 1000):
+                raise ValueError(f"{name}: found {given!r}, expected 0 to 1000 g")
         with _reading(self.parts[0]):
             settings = self.configuration
             level = platform_g or (table_g or 0.0) * settings["vibration"]["transmission"]
             platform = settings["platform"]
-            up = up_in_platform(attitude_deg, platform["up"])
+            up = up_in_platform(attitude, platform["up"])
             axes = [platform[f"gyro_{g}_axes"] for g in "xyz"]
         if not 0 <= level <= 1000:
             raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")
@@ -250,10 +262,18 @@ class Campaign:
         cut short, by the samples that the filter saw. Raises IndexError."""
         with _reading(self.parts[0]):
             rows = self._dwell_rows()
+        if not -len(rows) <= index < len(rows):
+            expected = f"{-len(rows)} to {len(rows) - 1}" if rows else "none: no dwell is finished"
+            raise IndexError(f"dwell: found {index}, expected {expected}")
         return rows[index]
 
     def _dwell_rows(self) -> list[slice]:
         times, orders, dwells = self.samples["time_ns"], self.orders, self.dwells
+        back = np.flatnonzero(times[1:] < times[:-1])
+        if len(back):   # the search in them would find anything
+            row = int(back[0]) + 1
+            raise FormatError(f"{self.parts[0]}: /samples/time_ns: found {times[row]} behind {times[row - 1]} in row {row}, "
+                              "expected growing times")
         begin = np.searchsorted(times, orders["from_ns"])
         end = np.searchsorted(times, orders["to_ns"])
         found: list[slice] = []
@@ -367,6 +387,15 @@ def _reading(path: Path) -> Iterator[None]:
                           "campaign's HDF5 file") from error
 
 
+def _numbers(value: Any) -> npt.NDArray[np.float64]:
+    """Of a caller; what is none becomes NaN."""
+    try:
+        numbers = np.asarray(value)
+        return numbers.astype(float) if numbers.dtype.kind in "iuf" else np.array(np.nan)
+    except (TypeError, ValueError):
+        return np.array(np.nan)
+
+
 def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
@@ -446,7 +475,8 @@ def _read_part(path: Path) -> _Part:
             raise FormatError(f"{path}: attribute {missing[0]}: found nothing, expected it")
         for name, kind in ATTRIBUTES.items():
             value = attributes[name]
-            if isinstance(value, h5py.Empty) or np.ndim(value) > 0 or isinstance(value, str) != (kind is str):
+            kinds = "U" if kind is str else "iub"
+            if isinstance(value, h5py.Empty) or np.ndim(value) > 0 or np.asarray(value).dtype.kind not in kinds:
                 raise FormatError(f"{path}: attribute {name}: found {value!r:.40}, expected one value of its kind")
             attributes[name] = kind(value)
         if attributes["format_version"] != FORMAT_VERSION:
@@ -540,6 +570,8 @@ def open_campaign(path: PathLike) -> Campaign:
 
     While it is written, too; then it is what there is at this moment. Raises FileNotFoundError, FormatError.
     """
+    if not os.fspath(path):   # Path would take it for the folder where one is
+        raise FileNotFoundError("path: found nothing, expected a campaign's HDF5 file or its folder")
     argument = Path(path)
     parts: list[_Part] = []
     for number, file in enumerate(_parts_of(argument), start=1):

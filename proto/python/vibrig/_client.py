@@ -69,6 +69,8 @@ class Client:
             raise ValueError("found several of socket, page and host, expected one of them")
         if (host is None) != (identity is None):
             raise ValueError("host and identity: found one of them, expected both or none")
+        if not isinstance(timeout_s, (int, float)) or not 0 < timeout_s <= 86400:
+            raise ValueError(f"timeout_s: found {timeout_s!r}, expected seconds above 0, 86400 at most")
         self._timeout_s = timeout_s
         self._tls: ssl.SSLContext | None = None
         self._path: str | None = None
@@ -77,11 +79,8 @@ class Client:
             self._tls = _mutual_tls(Path(str(identity)))
             self._name = host
         elif page is not None:
-            address = urllib.parse.urlsplit(page)
-            if address.scheme != "http" or not address.hostname:
-                raise ValueError(f"page: found {page!r}, expected an address such as http://127.0.0.1:8090/")
-            self._where = address.hostname, address.port or 80
-            self._name = address.netloc
+            self._where = _where_of_page(page)
+            self._name = urllib.parse.urlsplit(page).netloc
         else:
             self._path = os.fspath(socket) if socket is not None else os.environ.get("VIBRIG_SOCKET", DEFAULT_SOCKET)
             self._where = "localhost", 0
@@ -146,12 +145,15 @@ class Client:
         """
         query = {"channel": ",".join(channels), **({} if from_s is None else {"from": repr(float(from_s))})}
         answer = self._object("/api/v1/history?" + urllib.parse.urlencode(query, safe=","))
-        curves = {"time_s": np.array(answer["time_s"], dtype=float)}
-        for channel in answer["channels"]:
-            for of, name in (("mean", channel["name"]), ("min", channel["name"] + "_min"),
-                             ("max", channel["name"] + "_max")):
-                curves[name] = np.array(channel[of], dtype=float)  # null becomes NaN
-        return curves
+        try:
+            curves = {"time_s": np.array(answer["time_s"], dtype=float)}
+            for channel in answer["channels"]:
+                for of, name in (("mean", channel["name"]), ("min", channel["name"] + "_min"),
+                                 ("max", channel["name"] + "_max")):
+                    curves[name] = np.array(channel[of], dtype=float)  # null becomes NaN
+            return curves
+        except (KeyError, TypeError, ValueError) as error:
+            raise Answer(200, f"/api/v1/history: found {str(answer)[:60]}, expected time_s and channels") from error
 
     def stream(self, rate_hz: float = 1.0, *, after: int = 0, status: bool = True) -> Iterator[Update]:
         """The status as it changes and events as they happen, until the connection ends (OSError).
@@ -163,8 +165,8 @@ class Client:
         now: Any = {}
         with WebSocket(self._dial(), self._name, target) as link:
             for text in link.messages():
-                message = json.loads(text)
-                kind = message.get("type")
+                message = _message(text)
+                kind = message["type"]
                 if kind == "status":
                     now = message["status"]
                 elif kind == "delta":
@@ -214,10 +216,28 @@ class Client:
         return body
 
     def _object(self, target: str) -> Mapping[str, Any]:
-        value = json.loads(self._get(target))
+        body = self._get(target)
+        try:
+            value = json.loads(body)
+        except ValueError as error:   # another program answers there
+            raise Answer(200, f"{target}: found no JSON ({error}), expected an object") from error
         if not isinstance(value, dict):
             raise Answer(200, f"{target}: found {type(value).__name__}, expected an object")
         return value
+
+
+def _message(text: str) -> Mapping[str, Any]:
+    """Of the stream. Raises ConnectionError: who sends another is no vibrigd."""
+    try:
+        message = json.loads(text)
+    except ValueError:
+        message = None
+    if not isinstance(message, dict) or "type" not in message:
+        raise ConnectionError(f"stream: found {text[:60]!r}, expected a JSON object with a type")
+    for kind, name in (("status", "status"), ("delta", "patch")):
+        if message["type"] == kind and name not in message:
+            raise ConnectionError(f"stream: found {text[:60]!r}, expected a {name} in it")
+    return message
 
 
 def merge_patch(target: Any, patch: Any) -> Any:
@@ -242,11 +262,21 @@ def _words(body: bytes) -> str:
         return text.strip()[:500]
 
 
+def _where_of_page(page: str) -> tuple[str, int]:
+    try:
+        address = urllib.parse.urlsplit(page)
+        if address.scheme != "http" or not address.hostname or address.port == 0:
+            raise ValueError
+        return address.hostname, address.port or 80
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError(f"page: found {page!r}, expected an address such as http://127.0.0.1:8090/") from None
+
+
 def _host_and_port(host: str) -> tuple[str, int]:
     """rig.lab, rig.lab:8443, [fe80::1]:8443"""
     try:
         parts = urllib.parse.urlsplit("//" + host)
-        if not parts.hostname or parts.path:
+        if not parts.hostname or parts.path or parts.port == 0:
             raise ValueError
         return parts.hostname, parts.port or DEFAULT_PORT
     except ValueError:
