@@ -8,12 +8,12 @@
 #include <cstdio>
 #include <optional>
 
+#include "proto/text.hpp"
+
 namespace vibrig::plant {
 namespace {
 
-constexpr const char* kHelp =
-    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, hold S, go, speed F, "
-    "speed max, status, help";
+constexpr std::size_t kLongest = 4096;
 
 std::string_view trimmed(std::string_view text) {
     const auto begin = text.find_first_not_of(" \t\r");
@@ -43,19 +43,17 @@ double hold_s(std::string_view text) {
     return s;
 }
 
-/// 0: no limit.
-double speed_of(std::string_view text) {
+}  // namespace
+
+double speed_of(std::string_view text, const char* place) {
     if (text == "max") return 0;
     double speed = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), speed);
-    if (error != std::errc{} || end != text.data() + text.size() || !(speed > 0 && speed <= 1e6)) {
-        throw PlantError("speed: found \"" + std::string(text) +
-                         "\", expected max or a factor above 0");
+    if (!proto::read_number(text, speed) || !(speed >= 1e-3 && speed <= 1e6)) {
+        throw PlantError(std::string(place) + ": found \"" + proto::printable(text) +
+                         "\", expected max or a factor from 0.001 to 1e6");
     }
     return speed;
 }
-
-}  // namespace
 
 std::string Control::execute(std::string_view line) {
     const std::string_view text = trimmed(line);
@@ -93,7 +91,7 @@ std::string Control::execute(std::string_view line) {
             return "ok go";
         }
         if (word == "speed") {  // of a rig that owns the time
-            rig_.speed = speed_of(rest);
+            rig_.speed = speed_of(rest, "speed");
             return "ok speed " + std::string(rest);
         }
         if (word == "status") {
@@ -106,11 +104,11 @@ std::string Control::execute(std::string_view line) {
                 rig_.rig.shaker().faults());
             return status.data();
         }
-        if (word == "help") return std::string("ok ") + kHelp;
+        if (word == "help") return std::string("ok ") + kControlLines;
     } catch (const PlantError& error) {
         return std::string("error: ") + error.what();
     }
-    return "error: found \"" + std::string(text) + "\", expected " + kHelp;
+    return "error: found \"" + proto::printable(text) + "\", expected " + kControlLines;
 }
 
 bool Control::read(int descriptor) {
@@ -126,7 +124,12 @@ bool Control::read(int descriptor) {
         }
         pending_.erase(0, end + 1);
     }
-    if (pending_.size() > 4096) pending_.clear();
+    if (pending_.size() > kLongest) {
+        std::printf("error: found a line of more than %zu bytes, expected %s\n", kLongest,
+                    kControlLines);
+        std::fflush(stdout);
+        pending_.clear();
+    }
     return true;
 }
 

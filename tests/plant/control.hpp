@@ -26,4 +26,12 @@ class Control {
     std::string pending_;
 };
 
+/// The lines, for those who ask.
+inline constexpr const char* kControlLines =
+    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, hold S, go, speed F, "
+    "speed max, status, help";
+
+/// How many times real time; 0: "max", no limit. Throws PlantError that names the place.
+[[nodiscard]] double speed_of(std::string_view text, const char* place);
+
 }  // namespace vibrig::plant

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "proto/text.hpp"
 #include "tests/plant/faults.hpp"
 
 namespace vibrig::plant {
@@ -143,7 +144,7 @@ constexpr std::array<std::string_view, kChannels> kChannelNames{"outer", "inner"
                                                                 "x",     "y",     "z"};
 
 [[noreturn]] void fail(std::string_view spec, const std::string& what) {
-    throw PlantError("fault \"" + std::string(spec) + "\": " + what);
+    throw PlantError("fault \"" + proto::printable(spec) + "\": " + what);
 }
 
 double number(std::string_view spec, std::string_view text, const char* what, double low,
@@ -152,7 +153,7 @@ double number(std::string_view spec, std::string_view text, const char* what, do
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value) ||
         value < low || value > high) {
-        fail(spec, "found \"" + std::string(text) + "\", expected " + what);
+        fail(spec, "found \"" + proto::printable(text) + "\", expected " + what);
     }
     return value;
 }
@@ -166,7 +167,7 @@ const Description& describe(std::string_view spec, std::string_view name) {
         if (d.name == hyphens) return d;
         names += (names.empty() ? "" : ", ") + std::string(d.name);
     }
-    fail(spec, "unknown fault \"" + std::string(name) + "\", expected one of " + names);
+    fail(spec, "unknown fault \"" + proto::printable(name) + "\", expected one of " + names);
 }
 
 // Cuts off and returns what follows the first `mark`, if there is one.
@@ -186,7 +187,7 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
     } else if (second && (d.value == Value::factor_at || d.value == Value::share_at)) {
         fault.hz = number(spec, *second, "a frequency from 0.1 to 2000 Hz", 0.1, 2000);
     } else if (second) {
-        fail(spec, "found \"," + std::string(*second) + "\", expected one value");
+        fail(spec, "found \"," + proto::printable(*second) + "\", expected one value");
     }
     switch (d.value) {
         case Value::none:
@@ -201,6 +202,8 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
             fault.value = number(spec, first, "degrees from -360 to 360", -360, 360);
             break;
         case Value::seconds:
+            if (std::isfinite(fault.to_s))
+                fail(spec, "found two ends, expected one end: =S or ..TO");
             fault.to_s = fault.from_s + number(spec, first, "seconds from 0 to 1e9", 0, 1e9);
             break;
         case Value::share_at:
@@ -227,7 +230,8 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
             break;
         case Value::word:
             if (first != "exception" && first != "value") {
-                fail(spec, "found \"" + std::string(first) + "\", expected exception or value");
+                fail(spec,
+                     "found \"" + proto::printable(first) + "\", expected exception or value");
             }
             fault.value = first == "value" ? 1 : 0;
             break;
@@ -261,7 +265,8 @@ Fault parse_fault(std::string_view spec, double now_s) {
         const auto to = cut(*times, "..");
         fault.from_s = number(spec, *times, "a time in seconds, as in @100..200", 0, 1e9);
         if (to)
-            fault.to_s = number(spec, *to, "a time in seconds after the first", fault.from_s, 1e9);
+            fault.to_s = number(spec, *to, "a time in seconds after the first",
+                                std::nextafter(fault.from_s, 1e9), 1e9);
     }
     // "lose:0.01" is understood like "lose=0.01": only what is no channel can be a value.
     auto value = cut(rest, "=");
@@ -274,7 +279,7 @@ Fault parse_fault(std::string_view spec, double now_s) {
             if (kChannelNames[i] == *channel) fault.channel = i;
         }
         if (!d.channel || !fault.channel || (d.kind == FaultKind::spike && *fault.channel > 2)) {
-            fail(spec, "found channel \"" + std::string(*channel) + "\", expected " +
+            fail(spec, "found channel \"" + proto::printable(*channel) + "\", expected " +
                            (!d.channel                   ? "none"
                             : d.kind == FaultKind::spike ? "outer, inner or azimuth"
                                                          : "outer, inner, azimuth, x, y or z"));

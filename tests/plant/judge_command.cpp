@@ -1,11 +1,11 @@
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
 #include <memory>
-#include <sstream>
+#include <string>
 
 #include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
+#include "tests/plant/input_file.hpp"
 #include "tests/plant/judge.hpp"
 
 namespace vibrig::plant {
@@ -36,18 +36,10 @@ void add_judge_command(CLI::App& app, int& exit_code) {
         "2 for bad input.\nExample:\n  vibrig-plant judge result.json --truth truth.json --sigma "
         "4");
     command->callback([o, &exit_code] {
-        std::ostringstream text;
-        if (o->result == "-") {
-            text << std::cin.rdbuf();
-        } else {
-            std::ifstream in(o->result, std::ios::binary);
-            if (!in)
-                throw PlantError(o->result +
-                                 ": cannot be read, expected an identification result (JSON)");
-            text << in.rdbuf();
-        }
+        const std::string text = read_input(o->result == "-" ? "/dev/stdin" : o->result,
+                                            "an identification result (JSON)");
         const Truth truth = o->truth.empty() ? Truth{} : read_truth(o->truth);
-        const Verdict verdict = judge(text.str(), o->result, truth, o->sigma);
+        const Verdict verdict = judge(text, o->result, truth, o->sigma);
         std::cout << table_of(verdict) << std::flush;
         exit_code = verdict.passed ? 0 : 1;
     });

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "proto/dbc.hpp"
 #include "proto/empty_value.hpp"
 #include "proto/named_files.hpp"
+#include "proto/text.hpp"
 #include "tests/plant/commands.hpp"
 
 int main(int argc, char** argv) {
@@ -48,6 +50,11 @@ int main(int argc, char** argv) {
         if (first.starts_with("-") && first != "-h" && first != "--help" && first != "--version")
             arguments.insert(arguments.begin(), "run");
         if (arguments.empty()) arguments.emplace_back("run");
+        const std::string& word = arguments.front();
+        const auto is_it = [&word](const CLI::App* command) { return command->check_name(word); };
+        if (!word.starts_with("-") && std::ranges::none_of(app.get_subcommands({}), is_it))
+            throw std::runtime_error("found \"" + vibrig::proto::printable(word) +
+                                     "\", expected a command; vibrig-plant --help lists them");
         std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
         app.parse(arguments);
     } catch (const CLI::ParseError& error) {

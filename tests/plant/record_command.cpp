@@ -1,7 +1,9 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -49,7 +51,8 @@ void add_record_command(CLI::App& app, int& exit_code) {
         ->add_option("--profile", o->plan.profile,
                      "random vibration: the number of one of the truth's shaker.profiles, for each "
                      "of --table-g, which is its rms (to 0.1 dB) then; 0 for a sine")
-        ->delimiter(',');
+        ->delimiter(',')
+        ->check(CLI::Range(0, 65535));
     command
         ->add_option("--sweep", o->sweeps,
                      "FROM:TO in Hz for each of --table-g, - for none: an exponential sweep over "
@@ -92,19 +95,23 @@ void add_record_command(CLI::App& app, int& exit_code) {
         if (o->output != "-") {
             whole.emplace(o->output);
             file.open(whole->place(), std::ios::binary);
-            if (!file) throw PlantError(o->output + ": cannot be written");
         }
         std::ostream& out = o->output == "-" ? std::cout : file;
+        const auto check = [&] {
+            if (!out) throw PlantError(o->output + ": cannot be written: " + std::strerror(errno));
+        };
+        check();
         const bool terminal = isatty(STDERR_FILENO) == 1;
         Truth mean = truth;
-        const std::uint64_t samples = record(
-            truth, o->plan, out, &mean.coefficients, [terminal](std::size_t done, std::size_t all) {
+        const std::uint64_t samples =
+            record(truth, o->plan, out, &mean.coefficients, [&](std::size_t done, std::size_t all) {
+                check();
                 if (terminal)
                     std::fprintf(stderr, "\rdwell %zu of %zu%s", done, all,
                                  done == all ? "\n" : "");
             });
         out.flush();
-        if (!out) throw PlantError(o->output + ": cannot be written");
+        check();
         file.close();
         if (whole) whole->finish();
         if (!o->write_mean.empty()) write_truth(mean, o->write_mean);

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 #include <ostream>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include "proto/open_end.hpp"
 #include "proto/register_map.hpp"
 #include "proto/text.hpp"
+#include "tests/plant/input_file.hpp"
 #include "tests/plant/rig.hpp"
 
 namespace vibrig::plant {
@@ -133,9 +133,7 @@ std::vector<Vec3> CampaignPlan::table1() {
 
 std::vector<Vec3> read_positions(const std::string& name) {
     if (name == "table1") return CampaignPlan::table1();
-    std::ifstream in(name);
-    if (!in)
-        throw PlantError(name + ": cannot be read, expected \"table1\" or a CSV file of positions");
+    std::istringstream in(read_input(name, "\"table1\" or a CSV file of positions"));
     const std::array<const char*, 3> names{"alpha_deg", "beta_deg", "gamma_deg"};
     std::array<std::optional<std::size_t>, 3> column;
     std::vector<Vec3> positions;
@@ -148,7 +146,11 @@ std::vector<Vec3> read_positions(const std::string& name) {
         if (!column[0]) {
             for (std::size_t i = 0; i < 3; ++i) {
                 for (std::size_t c = 0; c < fields.size(); ++c) {
-                    if (proto::same_name(fields[c], names[i])) column[i] = c;
+                    if (!proto::same_name(fields[c], names[i])) continue;
+                    if (column[i])
+                        throw PlantError(place + "found column " + names[i] +
+                                         " twice, expected it once");
+                    column[i] = c;
                 }
                 if (!column[i])
                     throw PlantError(place + "no column " + names[i] + " in the header");

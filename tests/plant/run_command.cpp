@@ -6,14 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "proto/durable_file.hpp"
 #include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
 #include "tests/plant/control.hpp"
@@ -69,21 +68,11 @@ SimulationSettings settings_of(const Options& o) {
     settings.lockstep = o.clock == "rig";
     settings.duration_s = o.duration_s;
     if (o.speed != "max") {
-        std::size_t used = 0;
-        double speed = 0;
-        try {
-            speed = std::stod(o.speed, &used);
-        } catch (const std::exception&) {
-            used = 0;
-        }
-        if (used != o.speed.size() || !(speed > 0) || !std::isfinite(speed)) {
-            throw PlantError("--speed " + o.speed + ": expected max or a factor above 0");
-        }
-        if (!settings.lockstep && speed != 1) {
+        settings.speed = speed_of(o.speed, "--speed");
+        if (!settings.lockstep && settings.speed != 1) {
             throw PlantError("--speed " + o.speed +
                              ": the real clock has speed 1, expected --clock rig");
         }
-        settings.speed = speed;
     }
     return settings;
 }
@@ -101,19 +90,11 @@ int open_control(const std::string& path) {
     return fd;
 }
 
-// Written beside and renamed: a reader sees the whole file or none.
+// A reader sees the whole file or none.
 void write_ready_file(const Options& o, const ModbusServer& modbus) {
-    const std::string temporary = o.ready_file + ".new";
-    std::ofstream out(temporary);
-    out << nlohmann::json{{"can", o.can},
-                          {"modbus", modbus.address()},
-                          {"modbus_port", modbus.port()}}
-               .dump()
-        << "\n";
-    out.close();
-    if (!out || std::rename(temporary.c_str(), o.ready_file.c_str()) != 0) {
-        throw PlantError("--ready-file " + o.ready_file + ": cannot be written");
-    }
+    const nlohmann::json ready{
+        {"can", o.can}, {"modbus", modbus.address()}, {"modbus_port", modbus.port()}};
+    proto::write_output(o.ready_file, ready.dump() + "\n");
 }
 
 void run(const Options& o) {
@@ -207,13 +188,10 @@ void add_run_command(CLI::App& app, int& exit_code) {
     command->add_option("--dbc", o->dbc, "messages of the bus; default: the built-in rig.dbc");
     command->add_option("--ready-file", o->ready_file,
                         "write addresses here (JSON) once both servers listen");
-    command->footer(
-        fault_help() +
-        "Commands: fault SPEC, clear [NAME], estop open, estop close, table G, table own, "
-        "hold S, go, status, help\n"
-        "Example:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus "
-        "tcp:127.0.0.1:0 --seed 7 "
-        "--fault lose=0.01@100..200 --fault stuck:outer@300..301");
+    command->footer(fault_help() + "Commands: " + kControlLines +
+                    "\nExample:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus "
+                    "tcp:127.0.0.1:0 --seed 7 "
+                    "--fault lose=0.01@100..200 --fault stuck:outer@300..301");
     command->callback([o, &exit_code] {
         run(*o);
         exit_code = 0;

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -12,6 +11,7 @@
 
 #include "proto/durable_file.hpp"
 #include "proto/json_file.hpp"
+#include "tests/plant/input_file.hpp"
 #include "tests/plant/truth_fields.hpp"
 
 namespace vibrig::plant {
@@ -342,11 +342,7 @@ Truth parse_truth(std::string_view text, const std::string& file) {
 }
 
 Truth read_truth(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) throw PlantError(path + ": cannot be read, expected a truth file (JSON)");
-    std::ostringstream text;
-    text << in.rdbuf();
-    return parse_truth(text.str(), path);
+    return parse_truth(read_input(path, "a truth file (JSON)"), path);
 }
 
 std::string to_json(const Truth& truth) {

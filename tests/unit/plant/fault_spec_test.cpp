@@ -71,6 +71,8 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("lose=0.1@", "a time");
     expect("lose=0.1@5..", "a time");
     expect("lose=0.1@200..100", "after the first");
+    expect("lose=0.1@200..200", "after the first");
+    expect("bus-silent=3@5..9", "expected one end: =S or ..TO");
     expect("modbus-wrong=maybe", "exception or value");
     expect("stuck-contactor=1", "takes no value");
     expect("amplitude_scaled", "no value");
@@ -78,6 +80,9 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("timeout_register=0.5", "a whole number from 0 to 65535");
     expect("timeout_register=65536", "a whole number from 0 to 65535");
     expect("timeout_register", "no value");
+    // AND what is no text or moves the terminal's cursor is shown, not sent
+    EXPECT_EQ(complaint("lo\xff\x1bse").substr(0, 51),
+              R"(fault "lo\xff\x1bse": unknown fault "lo\xff\x1bse",)");
 }
 
 }  // namespace

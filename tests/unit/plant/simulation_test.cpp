@@ -4,9 +4,11 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <thread>
 
 #include "tests/plant/seqpacket_hub.hpp"
@@ -26,12 +28,13 @@ double value_of(const proto::Dbc& dbc, const can_frame& frame, const char* signa
 /// The rig on its own thread, with a client that talks to it as the daemon would.
 class SimulationTest : public testing::Test {
   protected:
-    void start(SimulationSettings settings, std::uint64_t seed = 1) {
+    void start(SimulationSettings settings, std::uint64_t seed = 1, int commands = -1) {
         Truth truth;
         truth.seed = seed;
         shared_ = std::make_unique<SharedRig>(truth);
         hub_ = std::make_unique<SeqpacketHub>(path_);
-        simulation_ = std::make_unique<Simulation>(*shared_, *hub_, dbc_, settings, stop_);
+        simulation_ = std::make_unique<Simulation>(*shared_, *hub_, dbc_, settings, stop_, commands,
+                                                   [] { return true; });
         thread_ = std::thread([this] { simulation_->run(); });
     }
     void stop() {
@@ -43,6 +46,11 @@ class SimulationTest : public testing::Test {
     void TearDown() override {
         stop();
         close(stop_);
+    }
+
+    double shared_time_s() {
+        const std::scoped_lock lock(shared_->mutex);
+        return shared_->now_s();
     }
 
     /// Frames of one tick, ended by RigTime with TickEnd.
@@ -194,6 +202,22 @@ TEST_F(SimulationTest, TicksAloneOnTheRealClockWithoutRigTime) {
     thread_.join();
     EXPECT_EQ(simulation_->counters().ticks, 5U);
     while (const auto frame = client.read(MSG_DONTWAIT)) EXPECT_NE(frame->can_id, 0x10U);
+}
+
+TEST_F(SimulationTest, ItsTimeGoesOnWhileCommandsComeWithoutAPause) {
+    // GIVEN commands of which there are always more
+    const int flood = eventfd(1, EFD_CLOEXEC);
+    SimulationSettings settings;
+    settings.lockstep = false;
+    settings.duration_s = 0.1;
+    start(settings, 1, flood);
+    // WHEN it runs on the real clock THEN it comes to its end, in which four ticks are due
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+    while (shared_time_s() < 0.0999 && std::chrono::steady_clock::now() < patience)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_GE(shared_time_s(), 0.0999);
+    stop();
+    close(flood);
 }
 
 TEST(Frames, NamesWhatADbcLacks) {
