@@ -46,8 +46,7 @@ void ControlLoop::run() {
         // a campaign on the rig's clock depend on the machine's load.
         if (stirred || now >= next)
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
-        take_proof();
-        void_gyros(dwells_.take_against_certificate());
+        follow_record(now);
         const Time commissioning = commissioning_.step(now);
         dwells_.take_done(campaign_);
         watch_arming();
@@ -117,6 +116,7 @@ void ControlLoop::take_over() {
     book_.expect_signed(journal_->recovery().signed_parts);
     if (const auto& by = journal_->recovery().torqued_by; !by.empty() && parts_.torquer) {
         campaign_.take_over_torque();
+        torque_left_ = true;
         log(Severity::warning, "journal",
             "the daemon ended while " + by +
                 " let it torque the platform (vibrig commission): zero is commanded");
@@ -156,10 +156,7 @@ void ControlLoop::take_over_latches() {
             parts_.rest.doubt(drivers::Channel::table_accel);
         }
     }
-    const auto& campaign = configuration_.campaign;
-    double level_g = campaign.loop.table_g;
-    for (const double g : campaign.table_g) level_g = std::max(level_g, g);
-    if (latches_.tripped()) campaign_.take_over_trip(latches_.causes(), level_g);
+    if (latches_.tripped()) campaign_.take_over_trip(latches_.causes(), true);
 }
 
 StatusData ControlLoop::status() const {

@@ -149,6 +149,8 @@ class ControlLoop {
     [[nodiscard]] std::string registers_not_tried() const;
     void keep_trials();
     void keep_voided();
+    void keep_end_of_torque(drivers::Time now);
+    void follow_record(drivers::Time now);
     void void_gyros(const std::string& why);
 
     Parts& parts_;
@@ -174,6 +176,7 @@ class ControlLoop {
     };
     std::optional<Attendance> attendance_;
     std::string device_;  ///< the identity that the shaker's controller reports; empty: not known
+    bool torque_left_ = false;      ///< by an earlier life's commissioning, as the journal has it
     std::size_t proofs_taken_ = 0;  ///< into the record, of the campaign's
     /// An arming that the journal is writing.
     struct Arming {

@@ -76,6 +76,17 @@ void ControlLoop::keep_voided() {
                 {name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
 }
 
+/// What an earlier life's commissioning has left torqued is over, or each later start would end it
+/// again.
+void ControlLoop::keep_end_of_torque(Time now) {
+    if (!torque_left_ || !campaign_.torque_ended(now)) return;
+    torque_left_ = false;
+    commissioning_.enter(
+        {name_of(Part::gyros), "", "", "", "torque",
+         Json{{"deg_per_h", {0, 0, 0}}, {"why", "an earlier daemon ended while it torqued"}}
+             .dump()});
+}
+
 /// By a campaign whose result has the certificate's coefficients with the other sign.
 void ControlLoop::void_gyros(const std::string& why) {
     if (why.empty() || !book_.standing(utc_now())[static_cast<std::size_t>(Part::gyros)].record)
@@ -102,6 +113,13 @@ void ControlLoop::take_proof() {
         log(Severity::warning, "commissioning",
             std::string("the proof is not in the record: ") + error.what());
     }
+}
+
+/// What has happened since the last round that it, or the journal's part of it, is to know.
+void ControlLoop::follow_record(Time now) {
+    take_proof();
+    keep_end_of_torque(now);
+    void_gyros(dwells_.take_against_certificate());
 }
 
 commission::ShakerParts ControlLoop::shaker_parts(

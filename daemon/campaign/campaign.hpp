@@ -73,11 +73,15 @@ class Campaign {
     void take_over_loop_check(const std::string& out_of_band);
     /// Likewise: what earlier lives have proved of stopping.
     void take_over_proofs(std::vector<ProofRecord> history);
-    /// Before the first step(): what an earlier life has left latched, in words.
-    void take_over_trip(const std::string& causes, double table_g = 0);
+    /// What is latched, in words. `unseen`, before the first step(): by an earlier life, and nobody
+    /// has seen rest since, of the highest level that this configuration may be armed for.
+    void take_over_trip(const std::string& causes, bool unseen = false);
     /// Before the first step(): what an earlier life may have left torqued. It is ended, and no
     /// torque is heeded but this one's own, until it is commissioned again.
     void take_over_torque();
+    /// That one is over: zero was commanded, and for a second the platform has said that it is not
+    /// torqued, where it can say so.
+    [[nodiscard]] bool torque_ended(drivers::Time now) const;
     /// The next proof goes up from 0.03 g, each rung held against the command before the next:
     /// nobody has seen yet what this shaker makes of a number.
     void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }

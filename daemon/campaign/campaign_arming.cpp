@@ -76,18 +76,25 @@ std::string sweeps_text(const Stops& stops) {
 
 }  // namespace
 
-void Campaign::take_over_trip(const std::string& causes, double table_g) {
+void Campaign::take_over_trip(const std::string& causes, bool unseen) {
     state_ = State::tripped;
     reason_ = causes;
     if (ports_.rig.torquer != nullptr) ports_.rig.torquer->doubt();
-    // Nobody has seen rest since: silence is none.
-    stop_.excited(table_g);
+    // Silence is no rest then.
+    if (unseen) stop_.excited(std::max(highest_level(), settings_.loop.table_g));
 }
 
 void Campaign::take_over_torque() {
     if (ports_.rig.torquer == nullptr) return;
     ports_.rig.torquer->doubt();
     torque_left_ = true;
+}
+
+bool Campaign::torque_ended(Time now) const {
+    if (!torque_left_ || !ports_.rig.torquer->zero() || torquing(ports_.rig)) return false;
+    const auto* const feed = ports_.rig.feed;
+    const Time said = feed != nullptr && feed->knows_torque() ? feed->torque().time : now;
+    return said - torque_sent_ > drivers::kSecond;
 }
 
 std::string Campaign::not_fit_to_arm(Time now) const {

@@ -214,7 +214,7 @@ TEST_F(ArmingTest, IsNamedWhenAnotherPersonStarts) {
 
 TEST_F(ArmingTest, OfAnEarlierLifesTripSilenceIsNoRest) {
     // GIVEN a trip that an earlier life left, and a rig of which nobody hears anything
-    campaign->take_over_trip("the daemon ended while armed by Ada", 5);
+    campaign->take_over_trip("the daemon ended while armed by Ada", true);
     shaker.stop_now();
     shaker.now.valid = false;
     const auto pass_silently = [this](double seconds) {
@@ -232,6 +232,26 @@ TEST_F(ArmingTest, OfAnEarlierLifesTripSilenceIsNoRest) {
     campaign->shut_down(now);
     pass_silently(30);
     EXPECT_FALSE(campaign->done(now));
+}
+
+/// Of a plan the levels are the plan's, and table_g is not played.
+TEST_F(ArmingTest, OfAnEarlierLifesTripThePadsRingDownFromThePlansLevel) {
+    PadRingDown& pads = settings.stop.pads;
+    pads = {0.5, 4, 0.5};
+    settings.table_g = {9};
+    settings.stops.resize(1);
+    settings.stops[0].table_g = 3;
+    make();
+    // GIVEN a table that stands, and a platform that does not come to rest on its pads
+    accelerometers.table_g = 0;
+    accelerometers.platform_g = 1;
+    campaign->take_over_trip("the daemon ended while armed by Ada", true);
+    shaker.stop_now();
+    const Time begun = now;
+    while (!disobeyed && now < begun + 60 * kSecond) run_rig();
+    // THEN it has the time that it has from 3 g
+    EXPECT_GT(pads.from_s(9), pads.from_s(3) + 2) << "or this shows nothing";
+    EXPECT_NEAR(drivers::to_seconds(now - begun), settings.stop.deadline_s + pads.from_s(3), 0.3);
 }
 
 TEST_F(ArmingTest, IsRefusedWhileAnEarlierLifesLatchIsNotAcknowledged) {

@@ -341,11 +341,16 @@ TEST_F(StagesTest, EndsTheTorqueOfADaemonThatDiedWhileItWasCommissioned) {
     tick();
     EXPECT_EQ(torque, (std::array<double, 3>{}));
     EXPECT_EQ(status().state, CampaignState::idle) << "nobody has to acknowledge it";
+    EXPECT_FALSE(campaign->torque_ended(now)) << "the platform has not confirmed it yet";
     // WHEN the platform did not hear it, it is said again
     torque = {0, 60, 0};
     for (int i = 0; i < 10; ++i) tick();
     EXPECT_EQ(torque, (std::array<double, 3>{}));
-    // THEN not once it is commissioned again, with torques of its own
+    EXPECT_FALSE(campaign->torque_ended(now));
+    // THEN it is over once the platform has shown for a second that it heard
+    for (int i = 0; i < 42; ++i) tick();
+    EXPECT_TRUE(campaign->torque_ended(now));
+    // AND not once it is commissioned again, with torques of its own
     for (int i = 0; i < 1000 && campaign->begin_commissioning("Ada", now) != ""; ++i) tick();
     ASSERT_TRUE(campaign->commissioning());
     torque = {0, 60, 0};
