@@ -119,6 +119,7 @@ void CrossCheck::for_daemon() {
     adaptive();
     rest();
     stops_in_time();
+    seconds_of_samples();
     set_points_fit();
     limits();
     frequency();
@@ -332,9 +333,7 @@ void CrossCheck::simulated_rig() {
 }
 
 void CrossCheck::rig_clock() {
-    if (!sound({"clock.source"}) || c_.clock != Configuration::ClockKind::rig) {
-        return;
-    }
+    if (!sound({"clock.source"}) || c_.clock != Configuration::ClockKind::rig) return;
     // The rig's clock stands still when the bus is silent: deadlines and watchdogs would never fire
     // on real hardware.
     const bool simulated_bus = c_.can.kind == drivers::CanPortSettings::Kind::seqpacket ||

@@ -39,6 +39,7 @@ class CrossCheck {
     void status_signals();
     void rest();
     void stops_in_time();
+    void seconds_of_samples();
     void seen_in_time();
     void adaptive();
     void rig_clock();

@@ -8,6 +8,7 @@
 #include "daemon/configuration/register_roles.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/configuration/warnings.hpp"
+#include "daemon/interlock/mean_motion.hpp"
 #include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::configuration {
@@ -52,6 +53,16 @@ void CrossCheck::stops_in_time() {
         "a window of rest of " + rounded(window_s) + " s with stop_deadline_s " + plain(deadline_s),
         rounded(most_s) + " s at most: the table has to stop before it can be seen to rest; a " +
             "window is of rest_window_s, and of 8 samples at least");
+}
+
+/// Before each ramp a second has to show gravity.
+void CrossCheck::seconds_of_samples() {
+    const double rate_hz = 1 / drivers::to_seconds(c_.assembler.sample_period);
+    if (!sound({"can.sample_rate_hz"}) || rate_hz >= rt::kFewestOfSecond) return;
+    refuse({"can.sample_rate_hz"}, plain(rate_hz),
+           plain(rt::kFewestOfSecond) +
+               " at least: no table is ramped before a second of samples has shown gravity where "
+               "the encoders say");
 }
 
 /// What is noticed after minutes is not noticed. A program on a busy machine may be late.

@@ -8,7 +8,6 @@ namespace vibrig::rt {
 
 namespace {
 constexpr double kMostBad = 0.5;
-constexpr double kFewestGood = 5;
 }  // namespace
 
 void MeanMotionMeter::begin(bool excited) noexcept {
@@ -30,11 +29,11 @@ bool MeanMotionMeter::add(const drivers::Sample& sample) noexcept {
             mean_.force[i] = sum_[i] / std::max(good_, 1.0);
         }
         mean_.cosine = mean_.sine = {};
-        mean_.good = stood && good_ >= kFewestGood && good_ >= (1 - kMostBad) * all_;
+        mean_.good = stood && good_ >= kFewestOfSecond && good_ >= (1 - kMostBad) * all_;
         // A second need not be a whole number of periods, nor of those of the samples' alias.
         if (excited_) {
             LockIn<3>::Fit fit;
-            mean_.good = mean_.good && lock_in_.fit(fit, kFewestGood);
+            mean_.good = mean_.good && lock_in_.fit(fit, kFewestOfSecond);
             if (mean_.good) {
                 mean_.force = fit.mean;
                 mean_.cosine = fit.cosine;

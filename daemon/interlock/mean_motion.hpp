@@ -8,6 +8,9 @@
 
 namespace vibrig::rt {
 
+/// Of a second that is good: with fewer, its mean and its vibration are not known.
+inline constexpr double kFewestOfSecond = 5;
+
 /// One second of the platform: where its gimbals were and what its accelerometers showed.
 struct MeanMotion {
     drivers::Time from = 0, to = 0;

@@ -284,6 +284,16 @@ TEST(Together, ContradictionsAreRefused) {
     EXPECT_THAT(complaint("shaker.backoff_min_ms = 6000"), HasSubstr("backoff_min_ms <= "));
     EXPECT_THAT(complaint("can.stale_deadline_ms = 20"), HasSubstr("found stale_deadline_ms"));
     EXPECT_THAT(complaint("can.sample_rate_hz = 8"), HasSubstr("more than one sample period"));
+    // Slower no second shows gravity, before each ramp, and levelling has no news for a second.
+    const std::string slow =
+        "can.stale_deadline_ms = 1500\nshaker.stop_deadline_s = 20\ncampaign.table_g = [0.0]\n";
+    EXPECT_THAT(complaint(slow + "can.sample_rate_hz = 4\ncampaign.levelling = true\n", true),
+                HasSubstr("can.sample_rate_hz: found 4, expected 5 at least"));
+    EXPECT_THAT(complaint(slow + "can.sample_rate_hz = 5\n", true),
+                Not(HasSubstr("can.sample_rate_hz")));
+    EXPECT_THAT(complaint(slow + "can.sample_rate_hz = 1\n", false),
+                Not(HasSubstr("can.sample_rate_hz")))
+        << "a recording is read as it is";
     EXPECT_THAT(complaint("shaker.unit = 250"), HasSubstr("1 to 247, or 255"));
     EXPECT_THAT(complaint("campaign.ready_timeout_s = 30", true), HasSubstr("a window shorter"));
     EXPECT_THAT(complaint("can.signals.temperature = \"\"", true),
