@@ -195,6 +195,31 @@ std::string missing_group(const configuration::Loaded& loaded) {
     return {};
 }
 
+std::vector<std::string> slow_statuses(const configuration::Loaded& loaded) {
+    const auto& c = loaded.configuration;
+    if (c.simulated()) return {};
+    const auto dbc = load_dbc(c.dbc);
+    const double deadline_ms = 1e3 * drivers::to_seconds(c.gimbal.status_deadline);
+    const auto& names = c.assembler.bindings;
+    std::vector<std::string> warnings;
+    for (const auto& [key, name] : {std::pair("can.signals.loop_closed", names.loop_closed),
+                                    {"can.signals.fault", names.fault},
+                                    {"can.signals.in_position", names.in_position}}) {
+        const auto bound = drivers::bind_signal(dbc, key, name);
+        if (!bound) continue;
+        const auto cycle_ms = bound.message->cycle_time_ms;
+        if (cycle_ms && *cycle_ms < deadline_ms) continue;
+        const std::string how = cycle_ms ? fmt::format("comes each {} ms", *cycle_ms)
+                                         : "has no GenMsgCycleTime, as one sent on change alone";
+        warnings.push_back(fmt::format(
+            "{}{}: found \"{}\", whose message by the DBC {}, expected one that comes within "
+            "gimbal.status_deadline_ms = {:g} ms, changed or not: else stale_platform stops the "
+            "table",
+            place_of(loaded, key), key, name, how, deadline_ms));
+    }
+    return warnings;
+}
+
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {
     constexpr double kSameDwell = 1e-9;
     const campaign::Settings& campaign = configuration.campaign;

@@ -23,6 +23,9 @@ void check_named(const configuration::Loaded& loaded);
 /// Why the start on this machine would be refused for the operators' group; empty: it would not.
 /// The package makes the group, so that a file checked on a desk may name one that is not there.
 [[nodiscard]] std::string missing_group(const configuration::Loaded& loaded);
+/// Of a real rig: statuses that the DBC does not have come as often as they have to, unchanged,
+/// too.
+[[nodiscard]] std::vector<std::string> slow_statuses(const configuration::Loaded& loaded);
 /// What the campaign's positions and levels would leave undetermined; empty if nothing.
 [[nodiscard]] std::vector<std::string> check_plan(
     const configuration::Configuration& configuration);

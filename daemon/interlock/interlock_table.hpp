@@ -72,8 +72,10 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::none, "none", "none"},
     {Trip::stale_channel, "stale_channel", "a resolver or accelerometer channel is stale",
      Guard::excitation, true},
-    {Trip::stale_platform, "stale_platform", "the platform's status is stale", Guard::excitation,
-     true},
+    {Trip::stale_platform, "stale_platform",
+     "the platform's status is stale: loop and fault have to come within "
+     "gimbal.status_deadline_ms, changed or not",
+     Guard::excitation, true},
     {Trip::loop_open, "loop_open", "stabilisation loop open", Guard::excitation, true},
     {Trip::platform_fault, "platform_fault", "platform fault", Guard::excitation, true},
     {Trip::over_amplitude, "over_amplitude", "table acceleration above the shaker's limit",

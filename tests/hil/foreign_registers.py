@@ -256,6 +256,24 @@ class Tried:
         return self.tool.returncode, json.loads(out) if out else {}, self.text + rest
 
 
+def on_change(checks, programs, folder, name):
+    """A platform's status that the DBC does not have come often enough is named before it trips."""
+    vibrigd, file, dbc = os.path.join(programs, "vibrigd"), os.path.join(folder, "on_change.toml"), os.path.join(folder, "on_change.dbc")
+    shipped = subprocess.run([vibrigd, "--print-dbc"], capture_output=True, text=True, check=True).stdout
+    with open(os.path.join(folder, "vibrigd.toml"), encoding="utf-8") as of:
+        stated = of.read()
+    for cycle, says in (("100", ""), ("1000", "comes each 1000 ms"), ("0", "has no GenMsgCycleTime")):
+        with open(dbc, "w", encoding="utf-8") as to:
+            to.write(shipped.replace('"GenMsgCycleTime" BO_ 544 100;', f'"GenMsgCycleTime" BO_ 544 {cycle};'))
+        with open(file, "w", encoding="utf-8") as to:
+            to.write(stated.replace("[can]\n", f'[can]\ndbc = "{dbc}"\n'))
+        check = subprocess.run([vibrigd, "--check", "--config", file], capture_output=True, text=True, check=False)
+        told = [line for line in check.stderr.splitlines() if "can.signals." in line]
+        good = all(f'"PlatformStatus.{flag}", whose message by the DBC {says}' in check.stderr for flag in ("LoopClosed", "Fault")) and len(told) == 2
+        checks.check(check.returncode == 0 and (good if says else not told), f"{name}: a status each {cycle} ms by its DBC: "
+                     f"{'is warned of' if says else 'is well'}", check.stderr)
+
+
 def tried(checks, programs, line):
     """Each register that is stated is written, read back and put back; nothing else is."""
     name = "RTU" if line else "TCP"
@@ -275,6 +293,7 @@ def tried(checks, programs, line):
         check = subprocess.run([os.path.join(programs, "vibrigd"), "--check", "--config", os.path.join(folder, "vibrigd.toml")], capture_output=True,
                                text=True, check=False)
         stated = dict(re.findall(r"^(shaker\.registers\.\S+) +=  (.*?)(?:  +\S.*)?$", check.stdout, re.M))
+        on_change(checks, programs, folder, name)
     checks.check(proof["by"] == "Ada" and len(stated) > 20 and proof["keys"] == stated, f"{name}: it is kept what was tried, by which a daemon lets it run",
                  [proof, stated, check.stderr])
     writes = [one for one in lines if one["what"] == "write"]

@@ -10,7 +10,9 @@ bool platform_is_silent(const drivers::PlatformStatus& platform, Time now) {
 }
 
 std::string platform_lacks(const drivers::PlatformStatus& platform, Time now) {
-    if (platform_is_silent(platform, now)) return "no platform status on the bus";
+    if (platform_is_silent(platform, now))
+        return "no platform status on the bus: loop and fault have to come each second, changed or "
+               "not";
     if (platform.fault) return "platform fault";
     if (!platform.ready || !platform.gyros_at_speed) return "platform not ready";
     if (!platform.loop_closed) return "stabilisation loop open";

@@ -84,7 +84,9 @@ TEST_F(CampaignTest, WaitsForTheFirstPlatformStatus) {
     // WHEN the campaign looks at it, THEN it waits and says for what
     for (int i = 0; i < 3; ++i) campaign->step(now += 100 * kMillisecond);
     EXPECT_EQ(status().state, CampaignState::waiting);
-    EXPECT_EQ(status().reason, "no platform status on the bus");
+    EXPECT_EQ(status().reason,
+              "no platform status on the bus: loop and fault have to come each second, changed or "
+              "not");
     // and goes on when the platform speaks
     EXPECT_TRUE(run_until(CampaignState::slewing, 30));
 }
