@@ -39,6 +39,7 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
       control_(control),
       table_g_(limits.table_g),
       platform_age_(limits.platform_age),
+      thermometer_(limits.thermometer),
       rules_(std::move(limits.rules)),
       transmission_(limits.transmission),
       frequency_hz_(limits.witness.frequency_hz),
@@ -158,7 +159,8 @@ void Interlock::check(const drivers::Sample& sample,
         if (const double nis = nis_.load(); nis != 0)
             judge(By::sample, Trip::filter_divergence, nis, now);
     }
-    if (platform.temperature_time > 0)
+    // One that has never spoken may be late, but not by then.
+    if (platform.temperature_time > 0 || (thermometer_ && guard == Guard::excitation))
         judge(By::sample, Trip::temperature,
               platform.knows_temperature(now) ? platform.temperature_c
                                               : std::numeric_limits<double>::quiet_NaN(),

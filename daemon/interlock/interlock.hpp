@@ -70,6 +70,7 @@ class Interlock {
         /// Settings of each random vibration that there may be: Ramp::random is a place in it,
         /// from 1.
         std::vector<RandomWitness::Settings> random = {};
+        bool thermometer = false;  ///< there is one, whether it has spoken or not
     };
     /// One row as it stands now.
     struct RowState {
@@ -224,6 +225,7 @@ class Interlock {
     double table_g_;
     bool table_bound_ = false;  ///< there is an accelerometer on the table; acquisition thread
     drivers::Time platform_age_;
+    bool thermometer_;
     std::vector<Rule> rules_;
     std::array<State, kMostRules> states_;
     std::atomic<Guard> guard_{Guard::idle};

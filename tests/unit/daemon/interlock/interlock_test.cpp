@@ -236,12 +236,13 @@ struct TableTest : testing::Test {
     std::unique_ptr<Interlock> interlock;
     drivers::Sample sample;
     drivers::PlatformStatus platform;
+    bool thermometer = false;
 
     void make(std::vector<Rule> rules) {
-        interlock = std::make_unique<Interlock>(
-            shaker, *control,
-            Interlock::Limits{
-                12.0, drivers::kSecond, std::move(rules), {.sample_period = kPeriod}});
+        Interlock::Limits limits{
+            12.0, drivers::kSecond, std::move(rules), {.sample_period = kPeriod}};
+        limits.thermometer = thermometer;
+        interlock = std::make_unique<Interlock>(shaker, *control, std::move(limits));
         sample.quality.fill(drivers::Quality::good);
         sample.force = {0, 1, 0};
         sample.time = 10 * drivers::kSecond;
@@ -324,6 +325,27 @@ TEST_F(TableTest, ATemperatureThatNoLongerComesIsNotBelieved) {
     ASSERT_EQ(interlock->tripped(), Trip::temperature);
     EXPECT_EQ(interlock->text_of(interlock->latched()),
               "platform temperature: not known, limit 90 degC");
+}
+
+TEST_F(TableTest, AThermometerThatNeverSpeaksIsNotBelievedOnceTheTableShakes) {
+    // GIVEN one that is configured and has said nothing since the start
+    thermometer = true;
+    make({{"hot", Trip::temperature, Reaction::abort, 90, 5, true}});
+    interlock->guard(Guard::armed);
+    for (int n = 0; n < 10 * 40; ++n) next();
+    EXPECT_EQ(interlock->tripped(), Trip::none) << "it may be late";
+    interlock->guard(Guard::excitation);
+    for (int n = 0; n < 4 * 40; ++n) next();
+    EXPECT_EQ(interlock->tripped(), Trip::none) << "the row's dwell";
+    for (int n = 0; n < 2 * 40; ++n) next();
+    ASSERT_EQ(interlock->tripped(), Trip::temperature);
+    EXPECT_EQ(interlock->text_of(interlock->latched()),
+              "platform temperature: not known, limit 90 degC");
+    // BUT where none is configured there is none to wait for
+    thermometer = false;
+    make({{"hot", Trip::temperature, Reaction::abort, 90, 5, true}});
+    for (int n = 0; n < 10 * 40; ++n) next();
+    EXPECT_EQ(interlock->tripped(), Trip::none);
 }
 
 TEST_F(TableTest, ALatchedAlarmStaysUntilItsNameIsAcknowledged) {
