@@ -65,6 +65,7 @@ void Daemon::start() {
     parts_.started = parts_.clock.now();
     make_results_folder();
     open_journal();
+    parts_.events.log(Severity::info, "configuration", parts_.in_force());
     open_outbox();
     start_recording();
     outside_.open();

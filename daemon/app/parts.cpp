@@ -1,5 +1,7 @@
 #include "daemon/app/parts.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -7,6 +9,8 @@
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/order/campaign_order.hpp"
+#include "daemon/record/digest.hpp"
+#include "daemon/version.hpp"
 #include "drivers/sample/signal_binding.hpp"
 
 namespace vibrig {
@@ -66,7 +70,8 @@ rt::Interlock::Limits interlock_limits(const Configuration& configuration, const
             configuration.interlock,
             witness_settings(configuration, dbc),
             configuration.estimator.transmission,
-            configuration.abort_bands};
+            configuration.abort_bands,
+            !configuration.assembler.bindings.temperature.empty()};
 }
 
 std::unique_ptr<record::Recorder> make_recorder(Parts& parts) {
@@ -162,6 +167,12 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
 
 drivers::CanPort& Parts::sending_port() noexcept {
     return sent_tap ? static_cast<drivers::CanPort&>(*sent_tap) : *port;
+}
+
+std::string Parts::in_force() const {
+    return fmt::format("in force: SHA-256 {}, {}, vibrigd {}",
+                       record::sha256_of_text(configuration::format_effective(loaded)),
+                       loaded.path.empty() ? "without a file" : loaded.path, kVersion);
 }
 
 const std::string& Parts::recordings() const noexcept {

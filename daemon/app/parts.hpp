@@ -50,6 +50,8 @@ struct Parts {
     [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     /// Where recordings go; empty: nowhere.
     [[nodiscard]] const std::string& recordings() const noexcept;
+    /// Which configuration is in force, by the SHA-256 that its recordings and --check give, too.
+    [[nodiscard]] std::string in_force() const;
 
     configuration::Loaded loaded;
     const configuration::Configuration& configuration;

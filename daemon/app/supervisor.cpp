@@ -187,6 +187,8 @@ void Supervisor::tell_journal() {
         // In the new file it stands already.
         latches_.add({journal::kJournalLatch, found, {}, {}, false, utc_now()});
         log(Severity::alarm, "journal", found + kJournalToDo);
+        // What the start said of it stands in the file that was put aside.
+        log(Severity::info, "configuration", parts_.in_force());
     }
     const auto status = journal_->status();
     if (std::exchange(journal_was_running_, status.running) == status.running) return;

@@ -19,6 +19,7 @@
 #include "daemon/configuration/warnings.hpp"
 #include "daemon/lock/rig_lock.hpp"
 #include "daemon/log/log_sink.hpp"
+#include "daemon/record/digest.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_server.hpp"
@@ -220,7 +221,10 @@ Prints prints() {
 void print_check(const vibrig::configuration::Loaded& loaded) {
     vibrig::check_bindings(loaded);
     vibrig::check_results(loaded);
-    std::cout << vibrig::configuration::format_effective(loaded);
+    const auto effective = vibrig::configuration::format_effective(loaded);
+    std::cout << effective
+              << "# SHA-256 of what stands above: " << vibrig::record::sha256_of_text(effective)
+              << '\n';
     // As comments: what stands above reads back as a configuration.
     const auto forecast = vibrig::forecast_campaign(loaded.configuration);
     std::istringstream words(forecast.words);
@@ -229,6 +233,8 @@ void print_check(const vibrig::configuration::Loaded& loaded) {
         std::cerr << "warning: " << line << '\n';
     if (const auto why = vibrig::missing_group(loaded); !why.empty())
         std::cerr << "warning: " << why << "; a start on this machine is refused\n";
+    for (const std::string& line : vibrig::slow_statuses(loaded))
+        std::cerr << "warning: " << line << '\n';
     for (const std::string& line : vibrig::check_plan(loaded.configuration))
         std::cerr << "warning: campaign: " << line << '\n';
     insist(forecast);

@@ -6,15 +6,19 @@ usage: journal_chain.py PROGRAMS [--seed N]
 """
 import contextlib
 import glob
+import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
+
+import h5py
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import latches  # noqa: E402
@@ -50,7 +54,19 @@ class Journal:
         return (found or [""])[0], time.monotonic() - begun
 
 
+def says_its_configuration(checks, rig, journal, what):
+    """A row of the signed chain has the SHA-256 of the configuration in force, as --check and a recording give it."""
+    check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
+    above, digest = re.search(r"(?s)(.*)^# SHA-256 of what stands above: (\w{64})$", check.stdout, re.M).groups()
+    checks.equal(hashlib.sha256(above.encode()).hexdigest(), digest, f"{what}: --check gives the SHA-256 of what it prints")
+    with contextlib.closing(sqlite3.connect(journal.path, timeout=5)) as database:
+        rows = [text for (text,) in database.execute("SELECT text FROM event WHERE source = 'configuration' AND text LIKE 'in force: %'")]
+    checks.check(rows and all(f"SHA-256 {digest}, " in row for row in rows), f"{what}: the journal has it of the configuration in force", rows)
+    return digest
+
+
 def whole(checks, rig, journal):
+    says_its_configuration(checks, rig, journal, "at the start")
     status = rig.wait_for(lambda s: s["journal"]["verified"], 10)
     code, verdict = journal.verify()
     checks.check(code == 0 and verdict["found"] == [], "a running daemon's journal verifies", str(verdict))
@@ -83,6 +99,7 @@ def named_and_acknowledged(checks, rig, journal, what, says, within_s):
     checks.check(trip.returncode == 1, f"{what}: a trip's acknowledgement is not the journal's", trip.stdout)
     code, verdict = journal.verify()
     checks.check(code == 0, f"{what}: a new one goes on, and is whole", str(verdict))
+    says_its_configuration(checks, rig, journal, what)
     rig.kill()
     rig.start()
     checks.check(journal.latch()[0] != "", f"{what}: SIGKILL does not acknowledge it", str(rig.latches()))
@@ -162,6 +179,9 @@ def recorded(checks, rig, journal):
     recording = max(glob.glob(os.path.join(rig.results, "*", "campaign*.h5")), key=os.path.getmtime)
     code, verdict = journal.verify("--anchor", recording)
     checks.check(code == 0, "the recording's head is in the journal", str(verdict))
+    with h5py.File(recording, "r") as file:
+        checks.equal(file.attrs["configuration_sha256"].decode(), says_its_configuration(checks, rig, journal, "after a campaign"),
+                     "and its configuration is the one that the journal says was in force")
     for part in ("", ".head"):
         shutil.copy(os.path.join(copy, "journal.sqlite3" + part), rig.results)
     checks.equal(journal.verify()[0], 0, "set back to a copy it is whole by itself")
