@@ -190,7 +190,8 @@ TEST_F(SweepsCommand, WrongInputIsOneClearError) {
         {"--sweeps 20,60 --evaluate p.json --config hard.toml", "--evaluate"},
         {"--sweeps 20,60 --turntable", "--turntable"},
         {"--about nothing.json", "nothing.json: cannot be read, expected a JSON file"},
-        {"--about empty.json", "empty.json: spectrum: found nothing, expected the result of"},
+        {"--about empty.json",
+         "empty.json: spectrum: found nothing, expected a result over frequency"},
         {"--about none.json", "none.json: found no JSON"},
         {"--about empty.json --highest 100", "--about"}};
     write("empty.json", "{}");
