@@ -171,6 +171,14 @@ std::span<const estimator::LoopReading> LoopCheck::readings_since(drivers::Time 
     return {first, readings_.end()};
 }
 
+estimator::RingDown LoopCheck::ring_down_since(drivers::Time time) const {
+    // What is there at rest as well, noise or the hum of a blower, does not decay: a platform that
+    // is bolted hard would be waited for for minutes. The crests of three sines side by side are
+    // less than three times their rms.
+    const double floor_g = std::max(6 * rig_.accelerometer_g, 3 * at_rest_.platform_g);
+    return estimator::ring_down(readings_since(time), floor_g);
+}
+
 std::string unit_of_ratio(double ratio) {
     struct Unit {
         double ratio;

@@ -11,6 +11,7 @@
 #include "daemon/status/status.hpp"
 #include "estimator/level/in_step.hpp"
 #include "estimator/level/loop_response.hpp"
+#include "estimator/level/ring_down.hpp"
 
 namespace vibrig::campaign {
 
@@ -58,8 +59,8 @@ class LoopCheck {
     /// While the level is still coming up, linearly over `ramp_s` from when it was asked for: table
     /// (platform over the transmission, where it has no accelerometer) over command; 0: unknown.
     [[nodiscard]] double over_command(drivers::Time asked, double ramp_s) const;
-    /// Readings that count and are not older than `time`.
-    [[nodiscard]] std::span<const estimator::LoopReading> readings_since(drivers::Time time) const;
+    /// How the platform swings on its pads by itself, of what counts since then.
+    [[nodiscard]] estimator::RingDown ring_down_since(drivers::Time time) const;
     /// Judges it, `shaker_g` being what the controller reports of the table: that is held against
     /// the command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);
@@ -96,6 +97,8 @@ class LoopCheck {
     [[nodiscard]] static std::string beyond_limits(const Settings& settings);
 
   private:
+    /// Readings that count and are not older than `time`.
+    [[nodiscard]] std::span<const estimator::LoopReading> readings_since(drivers::Time time) const;
     /// What moves: of the table where it is known throughout, else of the platform; less its mean.
     [[nodiscard]] std::vector<double> motion() const;
     [[nodiscard]] double most_in_step() const;  ///< arcsec per g at the platform

@@ -38,11 +38,7 @@ bool not_at_rest(const RestWitness& witness) {
 
 double PadRingDown::from_s(double table_g) const {
     if (!(rate_per_s > 0) || !(level_g > 0)) return safety::kRingDown_s;
-    // So much it has fallen until rest at the least, half of it for a soft mount; nothing is known
-    // of low levels. What decays slower is what hums at rest, and no time to wait for.
-    const double fell = 0.5 * std::log(level_g / (5 * safety::kRest_g));
-    const double least_per_s = fell / std::max(time_s, safety::kRestWindow_s);
-    return time_s + std::max(0.0, std::log(table_g / level_g)) / std::max(rate_per_s, least_per_s);
+    return time_s + std::max(0.0, std::log(table_g / level_g)) / rate_per_s;
 }
 
 StopMonitor::StopMonitor(const drivers::Shaker& shaker, Rest rest, const StopSettings& settings)

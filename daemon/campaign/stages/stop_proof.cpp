@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "estimator/level/ring_down.hpp"
-
 namespace vibrig::campaign {
 
 using drivers::from_seconds;
@@ -85,9 +83,7 @@ std::string StopProof::climb(Part then, Time now) {
 /// From the table's last motion on: what the pads do by themselves.
 void StopProof::keep_ring_down() {
     const double from_s = times_.table_stood_s();
-    const auto found =
-        estimator::ring_down(level_.loop.readings_since(times_.from() + from_seconds(from_s)),
-                             6 * level_.settings.rig.accelerometer_g);
+    const auto found = level_.loop.ring_down_since(times_.from() + from_seconds(from_s));
     auto& record = level_.proof.record();
     record.pads = {level_.level_g, times_.platform_s.value_or(0) - from_s, found.rate_per_s};
     record.pads_hz = found.frequency_hz;

@@ -6,10 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
-#include <vector>
 
-#include "estimator/level/ring_down.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
 #include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
@@ -198,29 +195,6 @@ TEST_F(StopMonitorTest, APlatformHasTheTimeOfItsPadsBeforeItDisobeys) {
     EXPECT_EQ(news, News::disobeyed);
     EXPECT_GT(monitor.longest_s(5), settings.deadline_s + 0.5) << "or this shows nothing";
     EXPECT_NEAR(took_s, monitor.longest_s(5), 0.15);
-}
-
-/// A blower that hums at rest, within a sixth of shaker.rest_g, decays hardly at all; the platform,
-/// bolted hard to its table, stood with it.
-TEST(PadRingDown, WhatGoesOnAtRestIsNoSwing) {
-    constexpr double kHum_g = 4e-3, kHum_hz = 12.3, kNoise_g = 1e-4;
-    for (unsigned seed = 1; seed <= 20; ++seed) {
-        std::mt19937 engine(seed);
-        std::normal_distribution<double> noise(0, kNoise_g);
-        std::vector<estimator::LoopReading> readings(60);
-        for (std::size_t n = 0; n < readings.size(); ++n) {
-            auto& reading = readings[n];
-            reading.time_s = 0.025 * static_cast<double>(n);
-            const double hum_g = kHum_g * std::sin(2 * std::numbers::pi * kHum_hz * reading.time_s);
-            reading.force_g = {0, 1 + hum_g + noise(engine), 0};
-        }
-        const PadRingDown pads{0.5, 0, estimator::ring_down(readings, 6 * kNoise_g).rate_per_s};
-        // THEN a stop that is not obeyed is said in seconds all the same
-        EXPECT_LE(pads.from_s(9), 2 * safety::kRingDown_s) << "seed " << seed;
-    }
-    // AND pads that did take their time in the proof have it
-    EXPECT_DOUBLE_EQ((PadRingDown{0.5, 5, 0.4}).from_s(9), 5 + std::log(18) / 0.4);
-    EXPECT_DOUBLE_EQ((PadRingDown{0.05, 0.4, 0.4}).from_s(9), 0.4 + std::log(180) / 0.4);
 }
 
 TEST_F(StopMonitorTest, NorDoAccelerometersThatAreSilent) {
