@@ -52,7 +52,7 @@ std::optional<Declared> read_table(const Entry& entry, const toml::table& table,
         } else if (key == "half_width") {
             half_width = part.number({0, largest}, unit);
         } else if (key == "dof") {
-            out.dof = part.number({1, 1e9}, unit).value_or(out.dof);
+            out.dof = part.number({1, 1e9}, "").value_or(out.dof);
         } else if (key == "declared" && node.is_boolean()) {
             out.declared = node.as_boolean()->get();
         } else if (key == "shape") {

@@ -166,8 +166,14 @@ struct Client::Impl {
         // A daemon that refuses may close before it has read all; its answer is there all the same.
         http::response_parser<http::string_body> parser;
         parser.body_limit(kLongestAnswer);
-        const error_code read =
-            run([&](auto done) { http::async_read(*stream, buffer, parser, std::move(done)); });
+        error_code read = run(
+            [&](auto done) { http::async_read_header(*stream, buffer, parser, std::move(done)); });
+        // What it announces is memory that is taken before the limit is looked at.
+        if (!read && parser.content_length().value_or(0) > kLongestAnswer)
+            read = http::error::body_limit;
+        if (!read)
+            read =
+                run([&](auto done) { http::async_read(*stream, buffer, parser, std::move(done)); });
         if (read) return written ? written : read;
         reply.status = static_cast<int>(parser.get().result_int());
         reply.body = std::move(parser.get().body());

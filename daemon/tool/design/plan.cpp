@@ -2,6 +2,8 @@
 #include <iostream>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/progress.hpp"
@@ -35,17 +37,18 @@ void check(Options& options, bool blocks) {
         require(std::isfinite(level) && level >= 0 && level <= 1000,
                 "--levels: found " + std::to_string(level), "0 to 1000 g");
     }
-    const std::array<const std::vector<double>*, 3> ranges{&options.outer, &options.inner,
-                                                           &options.azimuth};
+    const std::array<std::pair<std::string, const std::vector<double>&>, 3> ranges{
+        {{"--outer", options.outer}, {"--inner", options.inner}, {"--azimuth", options.azimuth}}};
     for (std::size_t k = 0; k < 3; ++k) {
-        if (ranges[k]->empty()) continue;
+        const auto& [name, range] = ranges[k];
+        if (range.empty()) continue;
         request.limited[k] = true;
-        request.limits.low[k] = ranges[k]->front();
-        request.limits.high[k] = ranges[k]->back();
-        require(std::isfinite(ranges[k]->front()) && std::isfinite(ranges[k]->back()) &&
-                    ranges[k]->front() <= ranges[k]->back(),
-                "gimbal limits: found " + std::to_string(ranges[k]->front()) + " to " +
-                    std::to_string(ranges[k]->back()),
+        request.limits.low[k] = range.front();
+        request.limits.high[k] = range.back();
+        require(std::isfinite(range.front()) && std::isfinite(range.back()) &&
+                    range.front() <= range.back(),
+                name + ": found " + std::to_string(range.front()) + " to " +
+                    std::to_string(range.back()),
                 "LOW,HIGH in deg");
     }
     for (const double target : request.targets) {

@@ -10,6 +10,7 @@ namespace vibrig::configuration {
 namespace {
 
 using estimator::uncertainty::Misfit;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 TEST(DeclaredInputs, ThatAreNoBudgetAreRefusedByKeyAndValue) {
@@ -66,6 +67,8 @@ TEST(DeclaredInputs, ForAnotherPowerOnAreNumbersOrTables) {
     EXPECT_NEAR(stated.ramp_in_dwell->u, 0.3 / std::sqrt(3.0), 1e-12);
     const auto silent = inputs("");
     EXPECT_FALSE(silent.turn_on_bias || silent.turn_on_linear || silent.ramp_in_dwell);
+    EXPECT_THAT(complaint("[uncertainty]\nramp_in_dwell = { u = 1, dof = 0 }"),
+                EndsWith("dof: found 0, expected a number from 1 to 1e+09"));
     EXPECT_THAT(complaint("[uncertainty]\nramp_in_dwell = -0.1"),
                 HasSubstr("uncertainty.ramp_in_dwell: found -0.1"));
 }

@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
@@ -45,15 +46,16 @@ class FullDoor {
     FullDoor& operator=(const FullDoor&) = delete;
 
     /// Lets those in who waited, and answers who comes after them.
-    void serve_next() const {
-        constexpr std::string_view kAnswer = "HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\n{}";
+    void serve_next(std::string_view length = "2") const {
+        const std::string answer =
+            "HTTP/1.1 200 OK\r\nContent-Length: " + std::string(length) + "\r\n\r\n{}";
         std::vector<int> inside;
         for (std::size_t n = 0; n < waiting_.size(); ++n)
             inside.push_back(::accept(listener_, nullptr, nullptr));
         char request = 0;
         EXPECT_EQ(::recv(inside.back(), &request, 1, 0), 1);
-        EXPECT_EQ(::send(inside.back(), kAnswer.data(), kAnswer.size(), MSG_NOSIGNAL),
-                  static_cast<ssize_t>(kAnswer.size()));
+        EXPECT_EQ(::send(inside.back(), answer.data(), answer.size(), MSG_NOSIGNAL),
+                  static_cast<ssize_t>(answer.size()));
         for (const int one : inside) ::close(one);
     }
 
@@ -91,6 +93,19 @@ TEST(Client, GivesUpInItsTimeWhereNobodyTakesIt) {
             << error.what();
     }
     EXPECT_GE(std::chrono::steady_clock::now() - begun, 200ms);
+}
+
+TEST(Client, AnAnswerThatAnnouncesMoreThanThereIsMemoryIsNone) {
+    const TemporaryFolder folder;
+    const FullDoor door(folder.file("s"));
+    std::jthread later([&] { door.serve_next("99999999999"); });
+    try {
+        (void)Client(folder.file("s"), 20s).get("/");
+        ADD_FAILURE() << "it was taken";
+    } catch (const ClientError& error) {
+        EXPECT_EQ(std::string(error.what()).rfind("vibrigd at " + folder.file("s"), 0), 0u)
+            << error.what();
+    }
 }
 
 TEST(Client, SaysWhoDoesNotAnswer) {

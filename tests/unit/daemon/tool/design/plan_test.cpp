@@ -270,7 +270,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"--evaluate random.json", "runs[1].profile: found road, expected a sine"},
           Case{"--runs 12 --levels 0,6 --done random.csv", "random.csv:2"},
           Case{"--levels 0,6 --config limit.toml", "shaker.limits.acceleration_g"},
-          Case{"--inner 30,20", "gimbal limits"},
+          Case{"--inner 30,20", "--inner: found 30"},
           Case{"--outer 1,2 --azimuth 1,2", "leave no position"},
           Case{"--grid 30 --positions lock.csv", "--grid"},
           Case{"--forbidden-within 5", "--forbidden"},
