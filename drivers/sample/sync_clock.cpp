@@ -11,6 +11,7 @@ namespace {
 constexpr double kThreeSigmaPerMad = 3 * 1.4826;
 /// Deviations that are never called outliers, ns: a quarter of a CAN frame at 1 Mbit/s.
 constexpr double kTolerance = 30'000;
+constexpr double kSpacing = 25'000'000;  // ns
 
 double median(std::span<double> values) noexcept {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
@@ -28,7 +29,8 @@ double limit_of(std::span<const double> residual, std::span<double> scratch) noe
 }  // namespace
 
 SyncClock::SyncClock(Time nominal_period) noexcept
-    : nominal_(static_cast<double>(nominal_period)) {}
+    : nominal_(static_cast<double>(nominal_period)),
+      every_(std::max<std::int64_t>(1, std::llround(kSpacing / nominal_))) {}
 
 void SyncClock::reset() noexcept {
     size_ = next_ = 0;
@@ -38,16 +40,18 @@ void SyncClock::reset() noexcept {
 
 bool SyncClock::observe(std::int64_t count, Time stamp) noexcept {
     const Point point{count, stamp};
+    const double spacing = nominal_ * static_cast<double>(every_);
     bool stepped = false;
+    if (size_ > 0 && count < due_) return false;
+    due_ = count + every_;
     if (size_ > 0) {
-        if (count <= anchor_.count) return false;
         const double off = static_cast<double>(stamp - time_of(count));
-        if (std::abs(off) > kStepPeriods * nominal_) {
+        if (std::abs(off) > kStepSpacings * spacing) {
             // Late stamps are an accident, and those of what catches up come closer together than
             // the device made them. Some at its own distance are the device's new time.
             const double apart = static_cast<double>(stamp - suspect_.stamp) -
                                  nominal_ * static_cast<double>(count - suspect_.count);
-            if (suspects_ == 0 || std::abs(apart) > 0.5 * nominal_) {
+            if (suspects_ == 0 || std::abs(apart) > 0.5 * spacing) {
                 suspect_ = point;
                 suspects_ = 1;
                 return false;

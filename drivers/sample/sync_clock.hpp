@@ -9,15 +9,16 @@
 namespace vibrig::drivers {
 
 /// The device's time: offset and rate of its sync count, fitted to the stamps of its frames by
-/// least squares over the last 64 counts. Stamps that a bus or a busy machine delayed stand out of
-/// the fit and do not move it. One thread, no allocation.
+/// least squares over the last 64 that are looked at: every one, or where they come faster one each
+/// 25 ms, so that a machine that is busy for some milliseconds is the same at any rate. Stamps that
+/// it or a bus delayed stand out of the fit and do not move it. One thread, no allocation.
 class SyncClock {
   public:
     explicit SyncClock(Time nominal_period) noexcept;
 
     /// Counts come in ascending order; one that does not is ignored. True: the stamps have stepped
-    /// away for good (kStepStamps in a row by more than kStepPeriods, on one line), and the fit
-    /// begins anew.
+    /// away for good (kStepStamps that are looked at in a row, by more than kStepSpacings, on one
+    /// line), and the fit begins anew.
     bool observe(std::int64_t count, Time stamp) noexcept;
     /// Whole microseconds; before the first observation 0.
     [[nodiscard]] Time time_of(std::int64_t count) const noexcept;
@@ -26,7 +27,7 @@ class SyncClock {
 
   private:
     static constexpr std::size_t kWindow = 64;
-    static constexpr double kStepPeriods = 5;
+    static constexpr double kStepSpacings = 5;
     static constexpr int kStepStamps = 4;
     struct Point {
         std::int64_t count = 0;
@@ -36,7 +37,9 @@ class SyncClock {
     void insert(Point point) noexcept;
     void fit() noexcept;
 
-    double nominal_;  ///< ns
+    double nominal_;        ///< ns
+    std::int64_t every_;    ///< counts from one that is looked at to the next
+    std::int64_t due_ = 0;  ///< the next one
     std::array<Point, kWindow> points_{};
     std::size_t size_ = 0;
     std::size_t next_ = 0;

@@ -94,6 +94,20 @@ TEST(SyncClock, KeepsTheDeviceTimeWhileWhatWasHeldUpCatchesUp) {
     }
 }
 
+TEST(SyncClock, AGatewayThatIsBehindForMillisecondsMovesNoFastCounts) {
+    // GIVEN samples at 1 and 10 kHz, and a gateway that is 8 ms behind for 30 of each 110 ms
+    for (const Time period : {kMillisecond, kMillisecond / 10}) {
+        SyncClock clock(period);
+        for (std::int64_t count = 0; count < 5 * kSecond / period; ++count) {
+            const Time since = count * period;
+            const bool behind = since > kSecond && since % (110 * kMillisecond) < 30 * kMillisecond;
+            EXPECT_FALSE(clock.observe(count, kStart + since + (behind ? 8 * kMillisecond : 0)));
+            // THEN the times are the device's, those that came late, too
+            ASSERT_EQ(clock.time_of(count), kStart + since) << period << " " << count;
+        }
+    }
+}
+
 TEST(SyncClock, BeginsAnewWhenTheStampsStepForGood) {
     SyncClock clock(kPeriod);
     for (std::int64_t count = 0; count < 200; ++count) {
