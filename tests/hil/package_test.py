@@ -32,6 +32,7 @@ CONFIGURATION, DATA = "/etc/vibrig/vibrigd.toml", "/var/lib/vibrig"
 VERSIONS = ("0.1.0", "0.1.1")
 LARGEST_EXPOSURE = 2.0
 SEED = 11
+ATTEMPTS = 4   # of what a machine that stands still ends
 SHORT = {"name": "packaged", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [9.0],
          "dwell_s": 4.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 1.0}
 WHOLE = {"name": "packaged"}   # the default: 14 positions at 9 g and 7 g, 100 s each
@@ -311,16 +312,55 @@ def digest(*patterns):
     return found
 
 
+class Tried(r.Checks):
+    """Checks that are told once it is known whether the machine held the rig up meanwhile."""
+
+    def __init__(self):
+        super().__init__()
+        self.made = []
+
+    def check(self, good, text, found=""):
+        self.made.append((good, text, found))
+        return bool(good)
+
+
 def stays(checks, rig, pid, states):
-    """What is armed or moves is not removed."""
-    wait_until(lambda: any(state in prop("StatusText") for state in ([states] if isinstance(states, str) else states)), 5)
+    """What is armed or moves is not removed. False: it is neither, and nobody tried."""
+    of = "armed" if states == ["armed"] else "shaking"
+    text = f"the package is not removed while it is {of}, and says what to do first"
+    if not wait_until(lambda: any(state in prop("StatusText") for state in states), 5):
+        return checks.check(False, text, prop("StatusText"))
     status, said = output("dpkg", "-r", "vibrig", timeout=120)
     found = (rig.status() or {"campaign": {"state": "no answer"}})["campaign"]["state"]
-    checks.check(status != 0 and "vibrigd is not removed" in said and "vibrig abort" in said,
-                 f"the package is not removed while it is {'armed' if states == 'armed' else 'shaking'}, and says what to do first", said)
-    checks.check(int(prop("MainPID")) == pid and found in ([states] if isinstance(states, str) else states), "nothing has stopped",
-                 f"{prop('MainPID')} {found}")
+    checks.check(status != 0 and "vibrigd is not removed" in said and "vibrig abort" in said, text, said)
     checks.equal(output("dpkg-query", "-W", "-f", "${db:Status-Status}", "vibrig")[1], "installed", "and it stays installed")
+    return checks.check(int(prop("MainPID")) == pid and found in states, "nothing has stopped", f"{prop('MainPID')} {found}")
+
+
+def upgrades_armed(checks, rig, package):
+    """The new package, while it is armed and while it shakes. Ends where something is not as it should be."""
+    rig.wait_for(lambda s: r.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
+    rig.acknowledge()   # what was killed and hung has latched
+    rig.wait_for(lambda s: s["campaign"]["state"] != "tripped" and not s["shaker"].get("stop_pending"), 30)
+    pid, armed = int(prop("MainPID")), rig.arm()
+    if not checks.check(armed.returncode == 0, "armed again", armed.stderr) or not stays(checks, rig, pid, ["armed"]):
+        return
+    status, said = output("dpkg", "-i", package, timeout=120)
+    checks.check(status == 0 and "takes the new one at its next rest" in said,
+                 "the package upgrades while the daemon is armed, and says that it is not restarted", journal()[-2500:] + said[-1000:])
+    still = rig.wait_for(lambda s: s["campaign"]["state"] == "armed", 10)
+    if not checks.check(int(prop("MainPID")) == pid and still is not None and still["campaign"]["state"] == "armed", "it goes on, armed",
+                        f"{prop('MainPID')} {r.state_of(still)}"):
+        return
+    rig.tool("start", "--by", "tester")
+    moves = ["slewing", "ramping", "settling", "recording", "resting"]
+    status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
+    if not checks.check(status is not None and status["campaign"]["state"] == "recording",
+                        "what is installed anew while armed waits while it shakes, too", r.state_of(status)):
+        return
+    stays(checks, rig, pid, moves)
+    checks.check(int(prop("MainPID")) == pid and (rig.status() or {"campaign": {"state": ""}})["campaign"]["state"] in moves,
+                 "and the campaign goes on", r.state_of(rig.status()))
 
 
 def upgrades(checks, rig, package):
@@ -330,27 +370,18 @@ def upgrades(checks, rig, package):
     configure(rig)
     rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("rest") == "at rest", 30)
     output("systemctl", "restart", UNIT)
-    before, pid = digest(*kept), int(prop("MainPID"))
-    rig.wait_for(lambda s: r.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
-    rig.acknowledge()   # what was killed and hung has latched
-    rig.wait_for(lambda s: s["campaign"]["state"] != "tripped" and not s["shaker"].get("stop_pending"), 30)
-    armed = rig.arm()
-    checks.check(armed.returncode == 0, "armed again", armed.stderr)
-    stays(checks, rig, pid, "armed")
-    status, said = output("dpkg", "-i", package, timeout=120)
-    checks.check(status == 0 and "takes the new one at its next rest" in said,
-                 "the package upgrades while the daemon is armed, and says that it is not restarted", journal()[-2500:] + said[-1000:])
-    still = rig.wait_for(lambda s: s["campaign"]["state"] == "armed", 10)
-    checks.check(int(prop("MainPID")) == pid and still is not None and still["campaign"]["state"] == "armed", "it goes on, armed",
-                 f"{prop('MainPID')} {r.state_of(still)}")
-    rig.tool("start", "--by", "tester")
-    moves = ("slewing", "ramping", "settling", "recording", "resting")
-    status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
-    checks.check(status is not None and status["campaign"]["state"] == "recording",
-                 "what is installed anew while armed waits while it shakes, too", r.state_of(status))
-    stays(checks, rig, pid, moves)
-    checks.check(int(prop("MainPID")) == pid and (rig.status() or {"campaign": {"state": ""}})["campaign"]["state"] in moves,
-                 "and the campaign goes on", r.state_of(rig.status()))
+    before = digest(*kept)
+    # A machine that stands still for two seconds holds the rig up in it, and with that the shaker: what is armed ends then.
+    held_up = lambda: journal().count("no valid read-back from the shaker")  # noqa: E731
+    for left in reversed(range(ATTEMPTS)):
+        tried, earlier = Tried(), held_up()
+        upgrades_armed(tried, rig, package)
+        if all(good for good, _, _ in tried.made) or held_up() == earlier or left == 0:
+            break
+        checks.note("the machine has held the rig up: once more")
+    for made in tried.made:
+        checks.check(*made)
+    pid = int(prop("MainPID"))
     rig.tool("abort", "--by", "tester")
     checks.equal(output("dpkg-query", "-W", "-f", "${Version}", "vibrig")[1], VERSIONS[1], "to the new version")
     checks.check(wait_until(lambda: int(prop("MainPID")) not in (0, pid) and prop("ActiveState") == "active", 60),

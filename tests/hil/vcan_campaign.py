@@ -95,7 +95,7 @@ def campaign(checks, rig, folder, may_repeat):
     """arm, start, finished; candump looks on. False: the machine was to blame that it did not finish, and it may be repeated."""
     log = os.path.join(folder, "candump.log")
     with open(log, "wb") as file:
-        candump = subprocess.Popen(["candump", "-L", BUS], stdin=subprocess.DEVNULL, stdout=file)
+        candump = subprocess.Popen(["candump", "-r", "4000000", "-L", BUS], stdin=subprocess.DEVNULL, stdout=file)
     first = rig.wait_for(lambda s: r.measuring(s) and
                          r.number(s["assembler"]["samples"]) > 20, 20)
     checks.check(first is not None and first["can"]["link"] == "running", "vibrigd hears the rig on vcan0",
