@@ -11,7 +11,7 @@ namespace {
 constexpr double kThreeSigmaPerMad = 3 * 1.4826;
 /// Deviations that are never called outliers, ns: a quarter of a CAN frame at 1 Mbit/s.
 constexpr double kTolerance = 30'000;
-constexpr double kSpacing = 25'000'000;  // ns
+constexpr double kSpacing = 20'000'000;  // ns
 
 double median(std::span<double> values) noexcept {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);

@@ -10,7 +10,7 @@ namespace vibrig::drivers {
 
 /// The device's time: offset and rate of its sync count, fitted to the stamps of its frames by
 /// least squares over the last 64 that are looked at: every one, or where they come faster one each
-/// 25 ms, so that a machine that is busy for some milliseconds is the same at any rate. Stamps that
+/// 20 ms, so that a machine that is busy for some milliseconds is the same at any rate. Stamps that
 /// it or a bus delayed stand out of the fit and do not move it. One thread, no allocation.
 class SyncClock {
   public:
