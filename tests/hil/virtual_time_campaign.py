@@ -8,6 +8,7 @@ import ctypes
 import glob
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -141,8 +142,10 @@ def main():
         results = [Boot(programs, "short", place).result(checks)[1] for place in folders]
         if all(results):
             same_samples(checks, folders)
-            checks.check(results[0] == results[1], "the short campaign gives equal estimates twice, byte for byte",
-                         f"{results[0][:2000]}\n{results[1][:2000]}")
+            # All but when it was: virtual time begins on the day that it is.
+            once, again = (re.sub(rb'"ended":"[^"]*"', b'"ended":""', text) for text in results)
+            checks.check(once == again, "the short campaign gives equal estimates twice, byte for byte",
+                         f"{once[-3000:]}\n{again[-3000:]}")
         path, text = full.result(checks)
         if text:
             judge(checks, programs, path, text, CAMPAIGNS[name].get("dwell_s", 100))
