@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
@@ -209,8 +210,11 @@ def grown(checks, programs, folder, what, fault=None, row=None, says=()):
                      rig.daemon.text().count("as at the loop check") == 1, f"{what}: said once, with its frequency and values",
                      rig.logs())
         checks.check(rig.daemon.says(f"{row}: over"), f"{what}: over with the dwell", rig.logs())
-        with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
-            logged = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE '%as at the loop check%'")]
+        end, logged = time.monotonic() + 20, []   # it is written after it is said
+        while not logged and time.monotonic() < end:
+            time.sleep(0.2)
+            with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
+                logged = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE '%as at the loop check%'")]
         checks.check(len(logged) == 1 and logged[0].startswith("at 25.1 Hz"), f"{what}: the journal has it", logged)
     finally:
         rig.stop()
