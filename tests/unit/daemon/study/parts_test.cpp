@@ -344,8 +344,8 @@ TEST_F(StudyParts, OfAPlanThatWasChangedAreNotTakenForAnothers) {
     EXPECT_THAT(complaint("\"kind\": \"campaigns\"", "\"kind\": \"recordings\""),
                 HasSubstr(path + ": recordings: found nothing, expected it, as"));
     // AND so is what it needs besides
-    EXPECT_EQ(complaint("\"version\": \"0.1.0\"", "\"version\": null"),
-              path + ": version: found null, expected a text, as `vibrig study plan` writes it");
+    EXPECT_EQ(complaint("\"version\": \"", "\"version\": 1, \"was\": \""),
+              path + ": version: found 1, expected a text, as `vibrig study plan` writes it");
     EXPECT_EQ(complaint("\"format\": 1", "\"format\": 2"), path + ": format: found 2, expected 1");
     EXPECT_THAT(complaint("{", "[{"), StartsWith(path + ": not JSON, expected what `vibrig study "
                                                         "plan` writes; line "));
