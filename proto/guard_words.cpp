@@ -1,5 +1,6 @@
 #include "proto/guard_words.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,9 +11,9 @@ namespace vibrig::proto {
 
 namespace {
 
-// "VbD1", "VbG1": kind and version.
+// "VbD2", "VbG2": kind and version.
 constexpr std::uint32_t kDaemonKind = 0x32446256;
-constexpr std::uint32_t kGuardKind = 0x31476256;
+constexpr std::uint32_t kGuardKind = 0x32476256;
 
 /// Little endian, one field after the other.
 class WordWriter {
@@ -91,6 +92,7 @@ std::array<std::uint8_t, kGuardWordBytes> encode(const GuardWord& word) noexcept
     to.put(word.sequence, 8);
     to.put(word.finding, 8);
     to.put(word.table_g);
+    for (const char c : word.version) to.put(static_cast<unsigned char>(c), 1);
     return bytes;
 }
 
@@ -129,6 +131,9 @@ std::optional<GuardWord> decode_guard_word(std::span<const std::uint8_t> bytes) 
     word.sequence = from.get(8);
     word.finding = from.get(8);
     word.table_g = from.number();
+    for (char& c : word.version) c = static_cast<char>(from.get(1));
+    const auto no_text = [](char c) { return c != 0 && (c < ' ' || c > '~'); };
+    if (std::ranges::any_of(word.version, no_text) || word.version.back() != 0) return {};
     if (flags > 31 || cause > static_cast<std::uint64_t>(GuardCause::stop_disobeyed) ||
         !is_level(word.table_g))
         return {};

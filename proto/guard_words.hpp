@@ -42,23 +42,25 @@ struct DaemonWord {
 struct GuardWord {
     std::uint64_t sequence = 0;  ///< of the word it answers; 0: it has heard none
     GuardCause cause = GuardCause::none;
-    std::uint64_t finding = 0;    ///< number of the finding; 0: none since its start
-    bool disobeyed = false;       ///< horn: press the emergency stop
-    bool sees = false;            ///< a witness is known
-    bool rest = false;            ///< all witnesses are at rest
-    bool reaches_shaker = false;  ///< its own Modbus connection answers
-    bool horn_confirms = true;    ///< false: horn or lamp do not read back as commanded
-    double table_g = 0;           ///< largest peak at the table that a witness shows
+    std::uint64_t finding = 0;       ///< number of the finding; 0: none since its start
+    bool disobeyed = false;          ///< horn: press the emergency stop
+    bool sees = false;               ///< a witness is known
+    bool rest = false;               ///< all witnesses are at rest
+    bool reaches_shaker = false;     ///< its own Modbus connection answers
+    bool horn_confirms = true;       ///< false: horn or lamp do not read back as commanded
+    double table_g = 0;              ///< largest peak at the table that a witness shows
+    std::array<char, 16> version{};  ///< of its program, "1.2.3", the rest zeros
     bool operator==(const GuardWord&) const = default;
 };
 
 inline constexpr std::size_t kDaemonWordBytes = 72;
-inline constexpr std::size_t kGuardWordBytes = 32;
+inline constexpr std::size_t kGuardWordBytes = 48;
 
 [[nodiscard]] std::array<std::uint8_t, kDaemonWordBytes> encode(const DaemonWord& word) noexcept;
 [[nodiscard]] std::array<std::uint8_t, kGuardWordBytes> encode(const GuardWord& word) noexcept;
 /// Nothing for a packet of another length, kind or version, for flags that do not exist and for a
-/// level that is not finite or below 0, or a ratio that is not 1 to 1000.
+/// level that is not finite or below 0, a ratio that is not 1 to 1000, or a version that is no
+/// text.
 [[nodiscard]] std::optional<DaemonWord> decode_daemon_word(
     std::span<const std::uint8_t> bytes) noexcept;
 [[nodiscard]] std::optional<GuardWord> decode_guard_word(

@@ -74,7 +74,8 @@ std::vector<std::size_t> factors_asked(const AllanRequest& request, std::size_t 
         return allan::all_factors(largest);
     }
     std::vector<double> taus;
-    std::istringstream list(request.taus);
+    // With a comma at the end, so that an element that is missing there is one, too.
+    std::istringstream list(request.taus + ',');
     for (std::string item; std::getline(list, item, ',');) {
         double tau = 0;
         if (!proto::read_number(item, tau) || !(tau > 0)) {
@@ -83,10 +84,6 @@ std::vector<std::size_t> factors_asked(const AllanRequest& request, std::size_t 
                                      "1,10,100");
         }
         taus.push_back(tau);
-    }
-    if (taus.empty()) {
-        throw std::runtime_error(
-            "--taus: nothing found, expected octave, decade, all or seconds such as 1,10,100");
     }
     return allan::factors_of(taus, request.tau0, largest);
 }

@@ -13,6 +13,7 @@
 #include "daemon/configuration/random_profiles.hpp"
 #include "daemon/plan/type_prior.hpp"
 #include "daemon/results/result_json.hpp"
+#include "estimator/filter/settings_check.hpp"
 
 namespace vibrig {
 
@@ -149,6 +150,7 @@ void CampaignDwells::resume(const std::string& by) {
     auto result = with_.book.identification().result();
     resumed_ = result.dwells.size();
     keep(std::move(result));
+    verdict_due_ = true;
 }
 
 estimator::spectrum::Shaken CampaignDwells::shaken() const {
@@ -268,6 +270,8 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     {
         const std::lock_guard lock(mutex_);
         if (!mark.empty()) result_.warnings.push_back("campaign marked: " + mark);
+        for (const auto& doubt : estimator::doubtful_keys(configuration_.estimator))
+            result_.warnings.push_back(doubt.words());
         for (const auto& words : judged.contradictions) result_.warnings.push_back(words);
         std::optional<tool::KnownType> type;
         if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};

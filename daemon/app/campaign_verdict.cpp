@@ -9,6 +9,7 @@
 #include "daemon/app/campaign_dwells.hpp"
 #include "daemon/app/judged.hpp"
 #include "daemon/configuration/random_profiles.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig {
 
@@ -18,8 +19,6 @@ namespace {
 
 constexpr std::size_t kShownResiduals = 128;
 
-/// With fewer rates than that to spare there is nothing to tell.
-constexpr int kFewestDegrees = 9;
 /// Beyond so many dwells the verdict comes with every tenth of them.
 constexpr std::size_t kEveryDwell = 60, kAmongMany = 10;
 
@@ -43,12 +42,13 @@ std::pair<int, int> dwell_named(const uncertainty::Assessment& assessed,
 
 }  // namespace
 
-/// Of the dwells so far, of all of them when the result is to be written.
+/// Of the dwells so far, of all of them when the result is to be written. Where there is none yet,
+/// as after a restart, whatever their number.
 bool CampaignDwells::verdict_wanted() {
     if (to_write_ != ToWrite::nothing) return !std::exchange(concluding_, true);
     if (!std::exchange(verdict_due_, false)) return false;
     const std::size_t dwells = with_.book.identification().rows().size();
-    return dwells <= kEveryDwell || dwells % kAmongMany == 0;
+    return dwells <= kEveryDwell || dwells % kAmongMany == 0 || verdict_.dwells == 0;
 }
 
 std::optional<Again> CampaignDwells::again() const {
@@ -124,7 +124,7 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
 
 void CampaignDwells::tell_verdict(const Judged& judged, campaign::Campaign& campaign) {
     const auto& assessed = judged.assessed;
-    const bool enough = assessed.done && assessed.degrees >= kFewestDegrees;
+    const bool enough = assessed.done && assessed.degrees >= uncertainty::kFewestDegrees;
     if (!enough && !concluding_) return;
     const auto& verdict = assessed.verdict;
     const std::string first = verdict.reasons.empty() ? "" : verdict.reasons.front().code;
@@ -162,7 +162,8 @@ void CampaignDwells::tell_verdict(const Judged& judged, campaign::Campaign& camp
                 assessed.widening,
                 concluding_,
                 std::move(residuals),
-                std::move(coefficients)};
+                std::move(coefficients),
+                judged.combinations};
 }
 
 }  // namespace vibrig

@@ -247,7 +247,7 @@ void ControlLoop::judge_first_reading(Time now) {
 /// then, and still wants its persons.
 void ControlLoop::watch_emergency_stop(Time now) {
     const auto reading = shaker_->reading();
-    if (!reading.valid || !first_reading_judged_) return;
+    if (!reading.fresh || !first_reading_judged_) return;
     const bool open = reading.emergency_stop_open;
     if (emergency_was_open_ == open) return;
     const bool at_start = !emergency_was_open_;

@@ -53,6 +53,15 @@ void hold_against_configuration(const estimator::Settings& settings,
     uncertainty::contradict(out.assessed.verdict, contradiction.first);
 }
 
+std::shared_ptr<const std::vector<VerdictStatus::Combination>> combinations(
+    const estimator::Result& result, const uncertainty::Assessment& assessed) {
+    auto found = std::make_shared<std::vector<VerdictStatus::Combination>>();
+    for (std::size_t i = 0; i < assessed.combinations.size(); ++i)
+        found->push_back({result.combinations[i].weights, assessed.combinations[i].value,
+                          assessed.combinations[i].u});
+    return found;
+}
+
 }  // namespace
 
 Judged judge(const estimator::Settings& settings, const estimator::Result& result,
@@ -62,6 +71,7 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
     Judged out;
     if (stage != uncertainty::Stage::ended) {
         out.assessed = uncertainty::assess(settings, result, stage);
+        out.combinations = combinations(result, out.assessed);
         hold_against_configuration(settings, result.dwells, means, out);
         return out;
     }
@@ -72,6 +82,7 @@ Judged judge(const estimator::Settings& settings, const estimator::Result& resul
              : tool::assess(settings, {}, result, all_rows, std::move(shaken));
     out.assessed = std::move(found.assessed);
     out.spectrum = std::move(found.spectrum);
+    out.combinations = combinations(anew ? anew->result : result, out.assessed);
     // With the campaign's own noise, as a replay of the recording has it, whatever noise was found.
     hold_against_configuration(settings, anew ? anew->result.dwells : result.dwells,
                                anew ? anew->means : means, out);

@@ -9,6 +9,7 @@
 #include "daemon/domain/events.hpp"
 #include "daemon/dwells/live.hpp"
 #include "daemon/results/spectrum_result.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/identification/dwell_means.hpp"
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
@@ -31,6 +32,7 @@ struct Judged {
     std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
     /// How the dwells contradict the configuration, and last what would explain it.
     std::vector<std::string> contradictions = {};
+    std::shared_ptr<const std::vector<VerdictStatus::Combination>> combinations = {};
 };
 
 /// Any thread. `all_rows`: with those apart from the result's; `means`: of the result's dwells.

@@ -84,7 +84,8 @@ void Outside::watch(bool tripped, bool alarm) {
                         guard_lacks_.empty() ? "sees, and reaches the shaker" : guard_lacks_);
         if (std::exchange(guard_was_heard_, guard.heard) != guard.heard)
             events_.log(guard.heard ? Severity::info : Severity::warning, "guard",
-                        guard.heard ? "heard" : "not heard: " + guard.note);
+                        (guard.heard ? "heard" : "not heard") +
+                            (guard.note.empty() ? "" : ": " + guard.note));
         cause = guard_link_->finding();
         const auto number = guard_link_->word().finding;
         if (cause != proto::GuardCause::none && std::exchange(guard_finding_, number) != number)

@@ -204,7 +204,9 @@ std::vector<std::string> slow_statuses(const configuration::Loaded& loaded) {
     std::vector<std::string> warnings;
     for (const auto& [key, name] : {std::pair("can.signals.loop_closed", names.loop_closed),
                                     {"can.signals.fault", names.fault},
-                                    {"can.signals.in_position", names.in_position}}) {
+                                    {"can.signals.in_position", names.in_position},
+                                    {"can.signals.slewing", names.slewing},
+                                    {"can.signals.command_echo", names.command_echo}}) {
         const auto bound = drivers::bind_signal(dbc, key, name);
         if (!bound) continue;
         const auto cycle_ms = bound.message->cycle_time_ms;

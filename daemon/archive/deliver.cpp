@@ -317,13 +317,23 @@ Delivery deliver(const std::string& campaign_folder, const Place& place, const s
     const bool inside = !within.empty() && *within.begin() != "..";
     entry.rig = as_name(rig);
     if (inside) {
-        if (const auto origin = origin_in(own.string()); !origin.rig.empty())
-            entry.rig = origin.rig;
+        const auto origin = origin_in(own.string());
+        if (!origin.rig.empty()) entry.rig = origin.rig;
+        // Registered as it is, it would be the genuine one from then on.
+        if (!origin.hash.empty() && origin.hash != entry.hash)
+            throw Refused(fmt::format(
+                "{}: found files with the hash {}, expected {} of {}: it was damaged or changed in "
+                "the archive; vibrig archive add of the rig's folder mends it",
+                own.string(), entry.hash, origin.hash, (own / kManifestName).string()));
         entry.key = within.string();
         delivery.kind = Delivery::Kind::was_there;
         delivery.folder = own.string();
     }
     refuse_rival(place, root, own.string(), entry);
+    // What an index beside it says of its files as they were closed: silent of a copy.
+    if (!inside)
+        for (const auto& words : record::changed_parts(campaign_folder, [](const auto&) {}))
+            throw Refused(words);
     if (!inside) bring(own, root, place, delivery, progress);
     note(place, root, inside, delivery);
     return delivery;

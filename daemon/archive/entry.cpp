@@ -7,12 +7,15 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "daemon/archive/manifest.hpp"
 #include "daemon/archive/vibration.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
+#include "daemon/record/whole_campaign.hpp"
 #include "drivers/sample/sample.hpp"
 
 namespace vibrig::archive {
@@ -21,6 +24,7 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::size_t kMostShown = 40;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 double number_in(const Json& object, const char* key) {
@@ -99,8 +103,11 @@ double take_settings(const record::Campaign& part, Entry& to) {
 }  // namespace
 
 void take_result(const std::string& result_json, double frequency_hz, Entry& to) {
+    if (result_json.empty()) return;
     const Json root = Json::parse(result_json, nullptr, false);
-    if (!root.is_object()) return;
+    if (!root.is_object())
+        throw ArchiveError(fmt::format("/result: found {}, expected the JSON of a result",
+                                       record::shown(result_json.substr(0, kMostShown))));
     try {
         take_coefficients(root, frequency_hz, to);
         to.nis = std::max(0.0, number_in(root, "nis"));
@@ -118,7 +125,11 @@ void take_result(const std::string& result_json, double frequency_hz, Entry& to)
                     walk[i].get<double>());
         }
     } catch (const Json::exception& error) {
-        throw ArchiveError(to.name + ": /result: " + error.what());
+        // The library's own number stands before a bracket.
+        const std::string_view words = error.what();
+        const std::size_t end = words.find("] ");
+        throw ArchiveError("/result: expected a result of vibrigd: " +
+                           std::string(words.substr(end == words.npos ? 0 : end + 2)));
     }
 }
 
@@ -137,6 +148,8 @@ Entry read_recorded(const std::string& folder) {
     std::map<std::string, std::vector<double>> degrees;
     std::string result;
     double frequency_hz = 0;
+    const record::WholeCampaign whole(
+        folder, record::read_part_head(parts.begin()->second).head.campaign, parts);
     for (const auto& [number, path] : parts) {
         if (record::WriterLock::held(path))
             throw ArchiveError(path + ": is being written; a campaign is archived when it is over");
@@ -146,6 +159,7 @@ Entry read_recorded(const std::string& folder) {
                                ": found the state \"running\" and nobody who writes it, "
                                "expected a closed file: vibrig recover " +
                                folder);
+        whole.check(number, part);
         if (entry.name.empty()) {
             entry.key = part.head.campaign;
             entry.name = part.head.name;
@@ -164,9 +178,16 @@ Entry read_recorded(const std::string& folder) {
         entry.dwells += static_cast<std::int64_t>(part.parts.front().dwells);
         frequency_hz = take_settings(part, entry);
         take_temperatures(part.conditions, degrees);
-        if (!part.result_json.empty()) result = part.result_json;
+        result = part.result_json;
     }
-    take_result(result, frequency_hz, entry);
+    whole.check_end(entry.state);
+    try {
+        if (result.empty() && entry.state == "finished")
+            throw ArchiveError("/result: found nothing, expected that of a finished campaign");
+        take_result(result, frequency_hz, entry);
+    } catch (const ArchiveError& error) {
+        throw ArchiveError(parts.rbegin()->second + ": " + error.what());
+    }
     for (const auto& [sensor, of] : degrees) {
         double sum = 0;
         for (const double t : of) sum += t;

@@ -81,11 +81,12 @@ std::vector<std::string> Index::rivals_of(const Entry& entry) {
         soci::statement ask =
             (database_.sql().prepare
                  << "SELECT c.key FROM campaign c JOIN result r ON r.campaign = c.key WHERE "
-                    "c.name = :name AND c.started_utc_ns = :started AND r.rig = :rig AND "
-                    "r.ended_utc_ns = :ended AND r.hash <> :hash AND c.key <> :key ORDER BY c.key",
+                    "c.name = :name AND c.started_utc_ns = :started AND (r.rig = :rig OR "
+                    "nullif(r.unit_serial, '') = :serial) AND r.ended_utc_ns = :ended AND r.hash "
+                    "<> :hash AND c.key <> :key ORDER BY c.key",
              use(entry.name, "name"), use(entry.started_utc_ns, "started"), use(entry.rig, "rig"),
-             use(entry.ended_utc_ns, "ended"), use(entry.hash, "hash"), use(entry.key, "key"),
-             into(key));
+             use(entry.unit_serial, "serial"), use(entry.ended_utc_ns, "ended"),
+             use(entry.hash, "hash"), use(entry.key, "key"), into(key));
         ask.execute();
         std::vector<std::string> found;
         while (ask.fetch()) found.push_back(key);

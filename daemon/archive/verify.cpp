@@ -108,6 +108,8 @@ void check_rows(const Entry& indexed, const fs::path& folder, const std::string&
     const std::string hash =
         campaign_hash(origin.hash.empty() ? list_files(folder.string()) : indexed.files);
     if (indexed.hash != hash) differs("result.hash", indexed.hash, hash, folder);
+    if (!origin.hash.empty() && origin.hash != indexed.hash)
+        differs("result.hash", indexed.hash, origin.hash, folder / kManifestName);
     if (!origin.rig.empty() && origin.rig != indexed.rig)
         differs("result.rig", indexed.rig, origin.rig, folder / kManifestName);
     try {

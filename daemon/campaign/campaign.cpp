@@ -24,6 +24,13 @@ namespace {
 
 constexpr Time kPoll = 200 * drivers::kMillisecond;
 
+// The loop that calls step() sleeps for half a second at most. After more than the longest
+// standstill people may think that it is over, and be at the table.
+constexpr Time kStandstill = 750 * drivers::kMillisecond, kLongestStandstill = 10 * kSecond;
+// After one the shaker's link has so long to come back: a request that is answered too late and
+// what follows, a connection and a read.
+constexpr Time kFreshLook = 2 * kSecond;
+
 constexpr bool kCampaign = true, kPosition = true, kNo = false;
 
 }  // namespace
@@ -135,7 +142,19 @@ void Campaign::begin(const std::string& by, Time now) {
     begin(*waiting_, State::waiting, now);
 }
 
+bool Campaign::awaits_look(Time now) const {
+    const bool may_move = row_of(state_).guard != rt::Guard::armed || state_ == State::checking ||
+                          state_ == State::levelling || stop_.excited() || stop_.stopping();
+    if (awake_ == 0 || may_move) return false;
+    // What was received meanwhile takes a moment, too.
+    return now - awake_ < (ports_.rig.shaker.reading().valid ? kPoll : kFreshLook);
+}
+
 Time Campaign::step(Time now) {
+    const Time last = std::exchange(stepped_, now);
+    // One in the midst of a look does not lengthen it: where it is the rule things go on, too.
+    if (last > 0 && now - last > kStandstill && !awaits_look(last))
+        awake_ = now - last < kLongestStandstill ? now : 0;
     for (;;) {
         const State before = state_;
         const std::size_t at = at_;
@@ -149,7 +168,7 @@ Time Campaign::step_once(Time now) {
     if (proving_->pressed()) proving_->look(state_ == State::tripped, reason_, now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
-        !zero_run_->hung_up() && !ports_.rig.shaker.reading().valid) {
+        !zero_run_->hung_up() && !ports_.rig.shaker.reading().valid && !awaits_look(now)) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
@@ -157,7 +176,7 @@ Time Campaign::step_once(Time now) {
     watch_gravity();
     watch_power();
     watch_arming(now);
-    return (this->*row_of(state_).step)(now);
+    return awaits_look(now) ? now + kPoll : (this->*row_of(state_).step)(now);
 }
 
 Time Campaign::wait(Time now) { return opening() ? open(now) : wait_for_platform(now); }

@@ -158,6 +158,9 @@ class Campaign {
     struct StateRow;
     [[nodiscard]] static const StateRow& row_of(CampaignState state);
     drivers::Time step_once(drivers::Time now);
+    /// This machine stood still, and nobody read the shaker meanwhile. Where nothing is excited or
+    /// torqued a fresh look is waited for, for a bounded time; nothing goes on before it.
+    [[nodiscard]] bool awaits_look(drivers::Time now) const;
     // One for each state; each returns when to be called next at the latest.
     drivers::Time stand_by(drivers::Time now);
     drivers::Time wait(drivers::Time now);
@@ -288,6 +291,8 @@ class Campaign {
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began
     drivers::Time started_ = 0;  ///< when the campaign began
+    drivers::Time stepped_ = 0;  ///< the last time that step() was called
+    drivers::Time awake_ = 0;    ///< since it was not for longer than it ever sleeps; 0: never
     Pace pace_;
     std::vector<NumberedStop> stops_;
     std::size_t at_ = 0;        ///< the stop that is being done

@@ -300,10 +300,11 @@ void CrossCheck::bus() {
     }
     if (sound({"can.sample_rate_hz", "can.stale_deadline_ms"}) &&
         c_.assembler.stale_deadline <= c_.assembler.sample_period) {
-        refuse({"can.stale_deadline_ms", "can.sample_rate_hz"},
-               plain(drivers::to_seconds(c_.assembler.stale_deadline) * 1e3) + " ms",
-               "more than one sample period, " +
-                   rounded(drivers::to_seconds(c_.assembler.sample_period) * 1e3) + " ms");
+        refuse(
+            {"can.stale_deadline_ms", "can.sample_rate_hz"},
+            "stale_deadline_ms of " + plain(drivers::to_seconds(c_.assembler.stale_deadline) * 1e3),
+            "more than one sample period, " +
+                rounded(drivers::to_seconds(c_.assembler.sample_period) * 1e3) + " ms");
     }
 }
 

@@ -53,6 +53,7 @@ class CrossCheck {
     void sweeps_of_plan();
     void writable_registers_apart();
     void set_points_fit();
+    void watchdog_timeout_fits();
     void set_points_of_plan_fit();
     /// What is written to a register, and how near to it the register's step has to come.
     struct SetPoint {

@@ -124,8 +124,8 @@ std::vector<std::string> warnings(const Loaded& loaded) {
     for (const auto& doubt : estimator::doubtful_keys(loaded.configuration.estimator)) {
         const auto key = doubt.key.substr(0, doubt.key.find('['));
         const auto stated = std::ranges::find(loaded.effective, key, &EffectiveValue::key);
-        all.push_back((stated == loaded.effective.end() ? "" : stated->origin + ": ") + doubt.key +
-                      ": found " + doubt.found + ", expected " + doubt.expected);
+        all.push_back((stated == loaded.effective.end() ? "" : stated->origin + ": ") +
+                      doubt.words());
     }
     return all;
 }

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -194,7 +196,30 @@ void CrossCheck::set_points_fit() {
     if (sound({"campaign.ramp_s"})) {
         held(r.ramp_time, "ramp_time", {c_.campaign.ramp_s, "s"}, "campaign.ramp_s");
     }
+    if (sound({"shaker.watchdog_period_ms"})) watchdog_timeout_fits();
     if (sound({"campaign.plan"})) set_points_of_plan_fit();
+}
+
+/// As the register holds it: rounded to 0 it is no watchdog, to more than its longest a late one,
+/// and one below the feeds' period stops every campaign.
+void CrossCheck::watchdog_timeout_fits() {
+    const Register& reg = c_.shaker.registers.watchdog_timeout;
+    const double period_s = drivers::to_seconds(c_.shaker.watchdog_period);
+    std::array<std::uint16_t, 2> words{};
+    const auto raw = std::span(words).first(reg.words());
+    // What does not fit at all, the driver refuses.
+    if (reg.access == Access::read || reg.type == RegisterType::bits ||
+        !proto::encode(reg, 3 * period_s, raw))
+        return;
+    const double held_s = proto::decode(reg, raw);
+    const double longest_s = drivers::to_seconds(drivers::kLongestWatchdogTimeout);
+    if (held_s > period_s && held_s <= longest_s) return;
+    refuse({"shaker.registers.watchdog_timeout.type", "shaker.registers.watchdog_timeout.scale",
+            "shaker.watchdog_period_ms"},
+           rounded(3 * period_s) + " s to be written, which the register holds as " +
+               rounded(held_s) + " s",
+           "more than " + rounded(period_s) + " s, the feeds' period, and " + plain(longest_s) +
+               " s at most");
 }
 
 void CrossCheck::set_points_of_plan_fit() {

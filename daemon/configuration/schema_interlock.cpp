@@ -137,6 +137,7 @@ class InterlockRow {
         if (const auto entry = part("dwell_s")) {
             const bool edge = rule.condition == rt::Trip::can_lost ||
                               rule.condition == rt::Trip::read_back ||
+                              rule.condition == rt::Trip::wrong_vibration ||
                               rule.condition == rt::Trip::stop_disobeyed;
             const double longest = edge ? 0 : condition.fixed ? kLongestFixedDwell_s : 3600;
             rule.dwell_s = entry->number({0, longest}, "s").value_or(rule.dwell_s);

@@ -16,9 +16,8 @@ namespace {
 
 std::string another_frequency(double hz, double sample_hz, double window_s) {
     return "another frequency: at " + rounded(sample_hz) +
-           " samples/s a harmonic of it falls on a multiple of the rate; the nearest free one is " +
-           rounded(spectrum::nearest_free(hz, sample_hz, window_s, spectrum::kHarmonicsPlanned)) +
-           " Hz";
+           " samples/s a harmonic of it falls on a multiple of the rate; " +
+           spectrum::nearest_free_words(hz, sample_hz, window_s);
 }
 
 /// A peak that a random vibration reaches 1 time in 400, and one that it hardly ever does.
@@ -252,6 +251,16 @@ void CrossCheck::sweeps_of_plan() {
             return blame("can.sample_rate_hz", " at " + rounded(rate_of(c_)) + " samples/s",
                          plain(kLeastRate_hz) +
                              " at least: slower ones have too few seconds that can be used");
+        // The controller stays there until the dwell ends: the accelerometers show it as standing,
+        // and a stop that is not obeyed there as rest.
+        for (const double end : {sweep.from_hz, sweep.to_hz})
+            if (sound({"can.sample_rate_hz", "vibration.level_window_s"}) &&
+                spectrum::forbidden(end, rate_of(c_), c_.estimator.level_window_s, 2))
+                return blame("can.sample_rate_hz", "",
+                             "ends at other frequencies: at " + rounded(rate_of(c_)) +
+                                 " samples/s " + plain(end) +
+                                 " Hz, where the controller stays until the dwell "
+                                 "ends, shows as a standing table does");
         const double slowest = std::min(sweep.from_hz, sweep.to_hz);
         if (slowest < c_.spectrum.mount.lowest_hz())
             return blame("vibration.transmission", "",

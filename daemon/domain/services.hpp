@@ -38,13 +38,14 @@ struct RecorderStatus {
 struct GuardStatus {
     std::string socket;  ///< empty: none is configured
     bool heard = false;  ///< a word came within its deadline
-    std::string note;    ///< why not
+    std::string note;    ///< why not; while it is heard: that it is of another version
     // Of what follows nothing is known while it is not heard.
     std::string cause;  ///< what it found, "none" without
     std::string text;   ///< in words
     bool disobeyed = false, sees = false, rest = false, reaches_shaker = false,
          horn_confirms = false;
     double table_g = 0;  ///< peak at the table, by its own measurement
+    std::string version;
 };
 
 /// The broker that watches a fleet of rigs.

@@ -126,6 +126,7 @@ bool Coils::show(Tune tune, Time now) {
     note_.clear();
     const bool horn = set(horn_, sounds(tune, now - begun_));
     const bool lamp = line_.connected() && set(lamp_, tune != Tune::none);
+    if (line_.connected()) line_.is_well();
     return horn && lamp;
 }
 
@@ -199,9 +200,14 @@ Alarm::Alarm(const AlarmSettings& settings) {
         if (::access(settings.command.c_str(), X_OK) != 0)
             say("warning", settings.command + ": cannot be run: " + words_of(errno));
     }
-    if (!coils_ && !stop_pager_) return;
-    thread_ = std::thread([this] { run(); });
-    ::pthread_setname_np(thread_.native_handle(), "alarm");
+    if (coils_) {
+        horn_thread_ = std::thread([this] { run_horn(); });
+        ::pthread_setname_np(horn_thread_.native_handle(), "horn");
+    }
+    if (stop_pager_) {
+        pager_thread_ = std::thread([this] { run_pager(); });
+        ::pthread_setname_np(pager_thread_.native_handle(), "pager");
+    }
 }
 
 Alarm::~Alarm() {
@@ -209,8 +215,9 @@ Alarm::~Alarm() {
         const std::lock_guard lock(mutex_);
         quit_ = true;
     }
-    changed_.notify_one();
-    if (thread_.joinable()) thread_.join();
+    changed_.notify_all();
+    for (std::thread* const thread : {&pager_thread_, &horn_thread_})
+        if (thread->joinable()) thread->join();
 }
 
 void Alarm::show(Tune tune) {
@@ -218,7 +225,7 @@ void Alarm::show(Tune tune) {
         const std::lock_guard lock(mutex_);
         if (std::exchange(tune_, tune) == tune) return;
     }
-    changed_.notify_one();
+    changed_.notify_all();
 }
 
 void Alarm::page(Tune kind, const std::string& text) {
@@ -228,7 +235,7 @@ void Alarm::page(Tune kind, const std::string& text) {
         if (waiting_.size() == kMostWaiting) waiting_.pop_front();
         waiting_.emplace_back(kind, message(kind, text));
     }
-    changed_.notify_one();
+    changed_.notify_all();
 }
 
 bool Alarm::confirms() const {
@@ -254,9 +261,7 @@ Pager* Alarm::pager(Tune kind) noexcept {
     return (kind == Tune::disobeyed ? disobeyed_pager_ : stop_pager_).get();
 }
 
-bool Alarm::paging() noexcept {
-    return stop_pager_ && (stop_pager_->busy() || disobeyed_pager_->busy());
-}
+bool Alarm::paging() noexcept { return stop_pager_->busy() || disobeyed_pager_->busy(); }
 
 void Alarm::attend(Tune kind, Time now) {
     Pager& one = *pager(kind);
@@ -273,39 +278,38 @@ void Alarm::attend(Tune kind, Time now) {
     if (const auto wrong = one.start(text, now); !wrong.empty()) say("warning", wrong);
 }
 
-void Alarm::run() {
-    Time due = 0;
+void Alarm::run_horn() {
     std::unique_lock lock(mutex_);
     while (!quit_) {
-        if (shown_ != tune_) due = 0;
         shown_ = tune_;
         lock.unlock();
-        // First: a horn that is not reached, or not even found, takes its time.
-        if (stop_pager_) {
-            attend(Tune::stop, drivers::steady_now());
-            attend(Tune::disobeyed, drivers::steady_now());
-        }
-        if (coils_ && drivers::steady_now() >= due) {
-            sound(drivers::steady_now());
-            due = drivers::steady_now() + kBeat;
-        }
+        sound(drivers::steady_now());
+        lock.lock();
+        changed_.wait_for(lock, std::chrono::nanoseconds(kBeat),
+                          [&] { return quit_ || shown_ != tune_; });
+    }
+    lock.unlock();
+    // Nobody would end it; only a table that obeys no stop is left sounding.
+    if (shown_ != Tune::disobeyed) (void)coils_->show(Tune::none, drivers::steady_now());
+}
+
+void Alarm::run_pager() {
+    std::unique_lock lock(mutex_);
+    while (!quit_) {
+        lock.unlock();
+        attend(Tune::stop, drivers::steady_now());
+        attend(Tune::disobeyed, drivers::steady_now());
         lock.lock();
         const auto woken = [&] {
-            return quit_ || shown_ != tune_ || std::ranges::any_of(waiting_, [&](const auto& one) {
+            return quit_ || std::ranges::any_of(waiting_, [&](const auto& one) {
                        return !pager(one.first)->busy();
                    });
         };
         if (paging())
             changed_.wait_for(lock, kLookAtPager, woken);
-        else if (coils_)
-            changed_.wait_for(
-                lock, std::chrono::nanoseconds(std::max<Time>(due - drivers::steady_now(), 1)),
-                woken);
         else
             changed_.wait(lock, woken);
     }
-    // Nobody would end it; only a table that obeys no stop is left sounding.
-    if (coils_ && shown_ != Tune::disobeyed) (void)coils_->show(Tune::none, drivers::steady_now());
 }
 
 }  // namespace vibrig::guard

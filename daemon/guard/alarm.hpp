@@ -83,7 +83,8 @@ class Pager {
     bool late_ = false;  ///< its time was up
 };
 
-/// Both, on a thread of their own in wall time: the guard waits for neither.
+/// Both, on a thread each in wall time: the guard waits for neither, and no page waits for a horn
+/// that is not reached, or not even found.
 class Alarm {
   public:
     /// Throws SettingsError for what libmodbus refuses.
@@ -100,17 +101,19 @@ class Alarm {
     [[nodiscard]] bool confirms() const;
 
   private:
-    void run();
+    void run_horn();
+    void run_pager();
     void sound(drivers::Time now);
     void attend(Tune kind, drivers::Time now);
     [[nodiscard]] Pager* pager(Tune kind) noexcept;
     [[nodiscard]] bool paging() noexcept;
 
-    std::unique_ptr<Coils> coils_;
-    // One that hangs with a stop does not hold up that the stop is not obeyed.
-    std::unique_ptr<Pager> stop_pager_, disobeyed_pager_;
+    std::unique_ptr<Coils> coils_;  ///< of the horn's thread, as what follows
     Tune shown_ = Tune::none;
     int bad_reads_ = 0;
+    // Of the pagers' thread. One that hangs with a stop does not hold up that the stop is not
+    // obeyed.
+    std::unique_ptr<Pager> stop_pager_, disobeyed_pager_;
 
     mutable std::mutex mutex_;  ///< guards what follows; never held while the outside is busy
     std::condition_variable changed_;
@@ -119,7 +122,7 @@ class Alarm {
     bool confirms_ = true;
     bool quit_ = false;
 
-    std::thread thread_;
+    std::thread horn_thread_, pager_thread_;
 };
 
 /// One line on standard error, and none where it would have to wait for it.

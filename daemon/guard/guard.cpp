@@ -1,5 +1,6 @@
 #include "daemon/guard/guard.hpp"
 
+#include <string_view>
 #include <utility>
 
 namespace vibrig::guard {
@@ -133,6 +134,7 @@ proto::GuardWord Guard::word(drivers::Time now) const {
     word.reaches_shaker = shaker_.word(now).known;
     word.horn_confirms = alarm_.confirms();
     word.table_g = sight_.table_g;
+    std::string_view(VIBRIG_VERSION).copy(word.version.data(), word.version.size() - 1);
     return word;
 }
 

@@ -8,17 +8,44 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
 
 #include "daemon/guard/settings.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::guard {
 
 namespace {
 
 std::string error_words(int error) { return std::generic_category().message(error); }
+
+/// -1: none within the time, `why` says it.
+int connected_socket(const addrinfo& to, int wait_ms, std::string& why) {
+    const int socket = ::socket(to.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (socket < 0) {
+        why = "no socket: " + error_words(errno);
+        return -1;
+    }
+    const int on = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    int error = ::connect(socket, to.ai_addr, to.ai_addrlen) == 0 ? 0 : errno;
+    if (error == EINPROGRESS) {
+        pollfd writable{socket, POLLOUT, 0};
+        socklen_t size = sizeof error;
+        if (::poll(&writable, 1, wait_ms) <= 0) {
+            error = ETIMEDOUT;
+        } else if (::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size) != 0) {
+            error = errno;
+        }
+    }
+    if (error == 0) return socket;
+    ::close(socket);
+    why = error_words(error);
+    return -1;
+}
 
 }  // namespace
 
@@ -74,29 +101,35 @@ bool ModbusTcp::lose(const std::string& what) {
     return false;
 }
 
+void ModbusTcp::is_well() {
+    note_.clear();
+    answered_ = address_;
+}
+
+std::vector<const addrinfo*> ModbusTcp::in_turn() const {
+    std::vector<const addrinfo*> all;
+    for (const addrinfo* one = addresses_.get(); one != nullptr; one = one->ai_next)
+        all.insert(one == answered_ ? all.begin() : all.end(), one);
+    return all;
+}
+
 bool ModbusTcp::connect() {
     if (!resolve()) return false;
-    const addrinfo& to = *addresses_;
-    const int socket = ::socket(to.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (socket < 0) return lose("no socket: " + error_words(errno));
-    const int on = 1;
-    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    int error = ::connect(socket, to.ai_addr, to.ai_addrlen) == 0 ? 0 : errno;
-    if (error == EINPROGRESS) {
-        pollfd writable{socket, POLLOUT, 0};
-        socklen_t size = sizeof error;
-        if (::poll(&writable, 1, wait_ms_) <= 0) {
-            error = ETIMEDOUT;
-        } else if (::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size) != 0) {
-            error = errno;
-        }
+    const auto all = in_turn();
+    const drivers::Time until = drivers::steady_now() + wait_ms_ * drivers::kMillisecond;
+    auto left = static_cast<drivers::Time>(all.size());
+    std::string why;
+    for (const addrinfo* const one : all) {
+        // One that swallows what comes leaves the others their part.
+        const drivers::Time part = (until - drivers::steady_now()) / left--;
+        const int socket = connected_socket(
+            *one, static_cast<int>(std::max<drivers::Time>(part, 0) / drivers::kMillisecond), why);
+        if (socket < 0) continue;
+        modbus_set_socket(context_.get(), socket);
+        address_ = one;
+        return connected_ = true;
     }
-    if (error != 0) {
-        ::close(socket);
-        return lose(error_words(error));
-    }
-    modbus_set_socket(context_.get(), socket);
-    return connected_ = true;
+    return lose(why);
 }
 
 }  // namespace vibrig::guard

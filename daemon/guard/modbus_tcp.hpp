@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 struct _modbus;
 struct addrinfo;
@@ -20,7 +21,8 @@ class ModbusTcp {
 
     /// Looks the host up, once; that may take long. False: note() says why.
     [[nodiscard]] bool resolve();
-    /// Looks up what has not been looked up.
+    /// Looks up what has not been looked up. All addresses of the name are tried, the one that
+    /// answered last first; they share the time of one.
     [[nodiscard]] bool connect();
     /// What the kernel has not sent yet is forgotten: an order that comes late is none.
     void close() noexcept;
@@ -35,7 +37,8 @@ class ModbusTcp {
     [[nodiscard]] const std::string& name() const noexcept { return name_; }
     /// Why there is no connection or no answer; empty: all is well.
     [[nodiscard]] const std::string& note() const noexcept { return note_; }
-    void is_well() { note_.clear(); }
+    /// It answers as it should.
+    void is_well();
 
   private:
     struct FreeModbus {
@@ -44,12 +47,16 @@ class ModbusTcp {
     struct FreeAddresses {
         void operator()(addrinfo* addresses) const noexcept;
     };
+    [[nodiscard]] std::vector<const addrinfo*> in_turn() const;
 
     std::string host_;
     int port_, wait_ms_;
     std::string name_;
     std::unique_ptr<_modbus, FreeModbus> context_;
     std::unique_ptr<addrinfo, FreeAddresses> addresses_;
+    // Of those: a peer that takes connections and answers nothing is not preferred.
+    const addrinfo* address_ = nullptr;   ///< of the newest connection
+    const addrinfo* answered_ = nullptr;  ///< whose peer answered last
     bool connected_ = false;
     std::string note_ = "not connected yet";
 };

@@ -114,9 +114,14 @@ Witnesses::Place Witnesses::find(const std::string& key, const std::string& name
 std::optional<double> Witnesses::value_of(const Place& place,
                                           std::span<const std::uint8_t> payload) noexcept {
     if (!proto::present(*place.message, *place.value, payload)) return {};
-    if (place.valid != nullptr && proto::decode_raw(*place.valid, payload).value_or(0) == 0)
-        return {};
-    return proto::decode(*place.value, payload);
+    if (place.valid != nullptr) {
+        const auto valid = proto::decode(*place.valid, payload);
+        if (!valid || *valid == 0 || proto::out_of_range(*place.valid, *valid)) return {};
+    }
+    const auto value = proto::decode(*place.value, payload);
+    // A code for an error stands as still as a table at rest.
+    if (!value || proto::out_of_range(*place.value, *value)) return {};
+    return value;
 }
 
 double Witnesses::count_of(const Place& place) noexcept {

@@ -278,8 +278,19 @@ void Interlock::check_motion(const drivers::Sample& sample) noexcept {
         judge(By::sample, Trip::tilt, tilt, sample.time);
 }
 
+/// Another thread may trip between two samples, and the control thread end the excitation before
+/// the next one.
+void Interlock::keep_contradiction() noexcept {
+    const Tripped trip = tripped_.load();
+    if (trip == kept_for_) return;
+    kept_for_ = trip;
+    const bool judged = trip && sampled_under_ == Guard::excitation;
+    at_trip_ = judged ? verdict_.contradicts : std::array<bool, 2>{};
+}
+
 Guard Interlock::follow_guard() noexcept {
     const Guard guard = guard_.load();
+    keep_contradiction();  // after that: who sees what a trip has ended sees the trip
     if (guard == Guard::excitation && sampled_under_ != Guard::excitation) {
         motion_.begin();
         witness_.begin();
@@ -326,8 +337,9 @@ void Interlock::lost_bus() noexcept {
     if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, drivers::steady_now());
 }
 
+/// Of every reply, also of one whose amplitude is no number: a controller whose power stage was
+/// cut may have none, and that it was is what the other registers say.
 void Interlock::check(const drivers::ShakerReading& reading) noexcept {
-    if (!reading.valid) return;
     const Guard guard = guard_.load();
     if (guard < read_under_) forget(By::read_back, guard);
     read_under_ = guard;
@@ -350,7 +362,7 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
               !reading.random->bands_armed,
           now);
     // Of random vibration a read-back is a mean that strays: the accelerometers' bands judge it.
-    if (const double commanded = commanded_g_.load(); commanded > 0 && !random) {
+    if (const double commanded = commanded_g_.load(); commanded > 0 && !random && reading.valid) {
         judge(By::read_back, Trip::amplitude_off,
               std::abs(20 * std::log10(reading.measured_g / commanded)), now);
     }

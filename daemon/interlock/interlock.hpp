@@ -104,9 +104,12 @@ class Interlock {
     [[nodiscard]] std::array<double, 2> seen_g() const noexcept {
         return {seen_g_[0].load(), seen_g_[1].load()};
     }
-    /// Acquisition thread: platform, table: whatever the newest judgement found wrong of it.
+    /// Acquisition thread: platform, table: whatever the newest judgement found wrong of it, and
+    /// the newest one before what is latched, though nothing is excited any more.
     [[nodiscard]] std::array<bool, 2> contradicts() const noexcept {
-        return sampled_under_ == Guard::excitation ? verdict_.contradicts : std::array<bool, 2>{};
+        const bool judged = sampled_under_ == Guard::excitation;
+        return {at_trip_[0] || (judged && verdict_.contradicts[0]),
+                at_trip_[1] || (judged && verdict_.contradicts[1])};
     }
     /// The newest second of force and angles.
     [[nodiscard]] MeanMotion second() const noexcept { return second_.read(); }
@@ -218,6 +221,7 @@ class Interlock {
         return commanded_.transmission > 0 ? commanded_.transmission : transmission_.load();
     }
     Guard follow_guard() noexcept;
+    void keep_contradiction() noexcept;
     void check_motion(const drivers::Sample& sample) noexcept;
 
     drivers::Shaker& shaker_;
@@ -254,6 +258,8 @@ class Interlock {
     MeanMotionMeter seconds_;
     AmplitudeWitness witness_;
     AmplitudeWitness::Verdict verdict_;  ///< the newest
+    Tripped kept_for_;                   ///< trip that this thread has seen last
+    std::array<bool, 2> at_trip_{};      ///< what verdict_ contradicted when it came
     std::vector<RandomWitness> random_;
     bool bands_needed_ = false;  ///< of the controller itself
     Ramp commanded_;

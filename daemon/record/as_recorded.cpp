@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -122,6 +123,34 @@ std::string dwell_difference(std::size_t row, const Dwell& was, const Dwell& is)
                                   collected(is.numbers.value_or(DwellNumbers{})));
     if (words.empty()) return {};
     return fmt::format("run {} position {}: {}", is.summary.run, is.summary.position, words);
+}
+
+std::string row_difference(const Campaign& campaign, std::size_t replayed) {
+    // What a daemon that died had not written yet is not there; raw logs have no such rows.
+    if (campaign.state != "finished" || campaign.dwells.size() == replayed) return {};
+    return fmt::format("/dwells: found {} rows, the replay gives {}", campaign.dwells.size(),
+                       replayed);
+}
+
+std::string level_difference(const Campaign& campaign, const std::vector<RecordedDwell>& dwells) {
+    // The recorder looks once a second, and may see what was commanded shortly before.
+    constexpr Time kAtEnds = drivers::kSecond;
+    for (const RecordedDwell& dwell : dwells) {
+        const Order& order = *dwell.order;
+        std::optional<double> commanded;
+        for (const ConditionRow& c : campaign.conditions) {
+            if (c.time < order.from + kAtEnds || c.time > order.to - kAtEnds) continue;
+            commanded = c.command_g;
+            if (same_bits(c.command_g, order.table_g)) break;
+        }
+        if (commanded && !same_bits(*commanded, order.table_g))
+            return fmt::format(
+                "run {} position {}: /orders/table_g: row {}: found {:g}, expected {:g} as in "
+                "/conditions/command_g of its time",
+                order.run, order.position, &order - campaign.orders.data() + 1, order.table_g,
+                *commanded);
+    }
+    return {};
 }
 
 EstimatesAgain::EstimatesAgain(const Campaign& campaign, const std::vector<RecordedDwell>& dwells)

@@ -16,6 +16,14 @@ namespace vibrig::record {
 /// an older recording lacks are not compared.
 [[nodiscard]] std::string dwell_difference(std::size_t row, const Dwell& was, const Dwell& is);
 
+/// Likewise of a finished campaign that has other than the `replayed` dwells.
+[[nodiscard]] std::string row_difference(const Campaign& campaign, std::size_t replayed);
+
+/// Likewise a level in /orders that no row of /conditions has while its dwell went on. The result
+/// of a joint identification depends on no level, so that no other number shows a changed one.
+[[nodiscard]] std::string level_difference(const Campaign& campaign,
+                                           const std::vector<RecordedDwell>& dwells);
+
 /// The rows of /estimates against a replay of their dwells. Of which sample a row was is not
 /// recorded, since the recorder looked while the filter worked: it has to be the state after one of
 /// them.

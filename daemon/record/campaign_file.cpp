@@ -231,6 +231,9 @@ void read_head(const File& file, Campaign& to) {
             if (std::string_view(name) != "simulated") throw;
         }
     });
+    if (head.part < 1)
+        throw hdf5::Error(
+            fmt::format("{}: attribute part: found {}, expected 1 or more", to.path, head.part));
     head.configuration = file.read_text("/configuration");
     refuse_changed_configuration(file, head.configuration);
     head.dbc = file.read_text("/dbc");

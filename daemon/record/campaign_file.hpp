@@ -54,8 +54,12 @@ struct RecordedDwell {
     bool cut_short = false;
 };
 
+/// The state of a file after which the campaign goes on in the next one.
+inline constexpr const char* kContinued = "continued";
 /// "campaign.h5", "campaign-2.h5" ...
 [[nodiscard]] std::string part_name(int part);
+/// It is called as that part is. A file of another name, put aside by somebody, stands for itself.
+[[nodiscard]] bool is_part_file(const std::string& path, int part);
 [[nodiscard]] std::string folder_of(const std::string& path);
 /// The last name of a path, that of a folder with a slash behind it too.
 [[nodiscard]] std::string base_name(const std::string& path);

@@ -10,6 +10,7 @@
 #include "daemon/record/campaign_checks.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/hdf5.hpp"
+#include "daemon/record/whole_campaign.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::record {
@@ -17,10 +18,9 @@ namespace vibrig::record {
 namespace fs = std::filesystem;
 using drivers::Time;
 
-namespace {
-/// Of missing parts, in one message.
-constexpr std::size_t kMostMissing = 5;
-}  // namespace
+bool is_part_file(const std::string& path, int part) {
+    return fs::path(path).filename() == part_name(part);
+}
 
 std::string part_name(int part) {
     return part == 1 ? "campaign.h5" : fmt::format("campaign-{}.h5", part);
@@ -56,12 +56,6 @@ std::map<int, std::string> part_files(const std::string& folder) {
 }
 
 namespace {
-
-std::vector<std::string> names_of(const std::map<int, std::string>& parts) {
-    std::vector<std::string> names;
-    for (const auto& [part, path] : parts) names.push_back(fs::path(path).filename().string());
-    return names;
-}
 
 /// Dwells that the filter heard of.
 std::size_t fed(const std::vector<Dwell>& dwells) {
@@ -228,37 +222,20 @@ Campaign read_parts(const std::string& path) {
     const Head first = read_part_head(path).head;
     const std::string folder = folder_of(path);
     const auto there = part_files(folder);
-    const auto own = there.find(first.part);
-    // A file of another name stands for itself.
-    const bool among =
-        own != there.end() && fs::path(own->second).filename() == fs::path(path).filename();
+    const bool among = there.contains(first.part) && is_part_file(path, first.part);
     std::map<int, std::string> parts = among ? there : std::map{std::pair{first.part, path}};
-    const int last = parts.rbegin()->first;
-    // As many as `part` says, which may be any number in a file that somebody changed.
-    const int absent = last - static_cast<int>(parts.size());
-    std::vector<std::string> missing;
-    for (int part = 1; part <= last && missing.size() < kMostMissing; ++part)
-        if (!parts.contains(part)) missing.push_back(part_name(part));
-    if (absent > static_cast<int>(missing.size()))
-        missing.push_back(fmt::format("{} more", absent - static_cast<int>(missing.size())));
-    if (!missing.empty())
-        throw std::runtime_error(fmt::format(
-            "{}: missing {} of campaign {}, expected all {} parts (found {})", folder,
-            fmt::join(missing, ", "), first.campaign, last, fmt::join(names_of(parts), ", ")));
+    const WholeCampaign whole(folder, first.campaign, parts);
     Campaign campaign;
     for (const auto& [number, file] : parts) {
         Campaign part = read_with_summary(file);
-        if (part.head.part != number || part.head.campaign != first.campaign)
-            throw std::runtime_error(
-                fmt::format("{}: found part {} of campaign {}, expected part "
-                            "{} of {}",
-                            file, part.head.part, part.head.campaign, number, first.campaign));
+        whole.check(number, part);
         if (number == 1) {
             campaign = std::move(part);
         } else {
             join(campaign, std::move(part));
         }
     }
+    if (among) whole.check_end(campaign.state);
     campaign.found = dwells::noise_found_in(campaign.result_json);
     return campaign;
 }

@@ -386,13 +386,29 @@ void Recorder::take(Head& head) {
     committed_steady_ns_ = drivers::steady_now();
 }
 
+/// What the disk refuses is tried again, in its order, with the next line and at each commit.
 void Recorder::append_dwells(const std::string& line) {
+    late_lines_.push_back(line);
+    if (late_lines_.size() > kMostKept) late_lines_.pop_front();
+    append_late_lines();
+}
+
+void Recorder::append_late_lines() {
     const std::string path = campaign_folder_ + "/dwells.csv";
-    std::FILE* file = std::fopen(path.c_str(), "a");
-    if (file == nullptr) return;
-    if (std::ftell(file) == 0) std::fprintf(file, "%s\n", kDwellsHeader);
-    std::fputs(line.c_str(), file);
-    std::fclose(file);
+    while (!late_lines_.empty()) {
+        std::FILE* file = std::fopen(path.c_str(), "a");
+        if (file == nullptr) return;
+        const long before = std::ftell(file);
+        std::string text = late_lines_.front();
+        if (before == 0) text = std::string(kDwellsHeader) + '\n' + text;
+        const bool taken = std::fputs(text.c_str(), file) >= 0;
+        if (std::fclose(file) != 0 || !taken) {
+            // A line that is half there would be believed, or refused, by who reads it.
+            if (::truncate(path.c_str(), before) != 0) late_lines_.pop_front();
+            return;
+        }
+        late_lines_.pop_front();
+    }
 }
 
 void Recorder::take(const Order& order) {
@@ -443,7 +459,7 @@ void Recorder::write_kept() {
 
 void Recorder::write_gap(const Gap& gap) {
     ++shown_.gaps;
-    if (writer_) writer_->put(gap);
+    kept_.push_back(gap);
 }
 
 void Recorder::look_at_estimate() {
@@ -471,6 +487,7 @@ void Recorder::commit(bool all) {
     committed_steady_ns_ = now;
     alive();
     if (raw_) raw_->flush();
+    append_late_lines();
     alive();
     if (!writer_ && now >= retry_steady_ns_ && open_file()) {
         lost_.stream = "samples";
@@ -530,6 +547,14 @@ void Recorder::take(const Ended& ended) {
     writer_.reset();
     raw_.reset();
     head_.reset();
+    // What no file took of this campaign is not the next one's.
+    const std::size_t dropped = std::erase_if(
+        kept_, [](const auto& entry) { return !std::holds_alternative<EventRecord>(entry); });
+    {
+        const std::lock_guard lock(mutex_);
+        status_.entries_dropped += dropped;
+    }
+    late_lines_.clear();
     shown_.recording = false;
     on_event_(lost_.lost > 0 ? Severity::warning : Severity::info,
               fmt::format("{}: {} samples, {} frames, {} lost",

@@ -121,6 +121,7 @@ class Recorder {
     void refuse(const std::string& why);
     void write_gap(const Gap& gap);
     void append_dwells(const std::string& line);
+    void append_late_lines();
     void write_kept();
     void keep_few();
     void show();
@@ -150,7 +151,8 @@ class Recorder {
     std::unique_ptr<RawLog> raw_;
     std::deque<FrameRecord> late_sent_;
     /// What goes into the file once it can be written: few and small, unlike the samples.
-    std::deque<std::variant<Order, Dwell, Swept, Played, EventRecord>> kept_;
+    std::deque<std::variant<Order, Dwell, Swept, Played, EventRecord, Gap>> kept_;
+    std::deque<std::string> late_lines_;  ///< of dwells.csv, that the disk has not taken
     std::int64_t committed_steady_ns_ = 0, retry_steady_ns_ = 0;
     drivers::Time newest_sample_ = 0, estimate_at_ = 0, looked_around_at_ = 0;
     std::uint64_t estimate_samples_ = 0;

@@ -105,7 +105,7 @@ void close_part(const std::string& path, const std::string& next) {
     const Campaign part = read_part(path);
     File file = File::open(path, File::Mode::write);
     hdf5::Table(file, "/samples", specs_of(drivers::Sample{})).keep(part.samples.size());
-    write_end(file, {"continued", "the campaign goes on in " + next, "", "",
+    write_end(file, {kContinued, "the campaign goes on in " + next, "", "",
                      last_time(part) + part.head.utc_offset_ns});
     file.close();
 }
@@ -116,9 +116,7 @@ Recovery recover_one(const std::string& path) {
     Recovery recovery;
     const Head head = read_part_head(path).head;
     auto parts = part_files(folder_of(path));
-    // A file of another name stands for itself.
-    if (const auto own = parts.find(head.part); own == parts.end() || own->second != path)
-        parts = {{head.part, path}};
+    if (!is_part_file(path, head.part)) parts = {{head.part, path}};
     const int last = parts.rbegin()->first;
     recovery.was_closed = true;
     for (const auto& [number, file] : parts) {

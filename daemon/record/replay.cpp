@@ -167,6 +167,10 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
             if (options.progress) options.progress(at, samples.size());
         }
     };
+    const auto note_difference = [&out](const std::string& what) {
+        if (!what.empty()) ++out.different;
+        if (out.first_difference.empty()) out.first_difference = what;
+    };
     const Order* newest = nullptr;
     const auto take = [&] {
         for (Dwell dwell; take_done(player, dwell, newest);) {
@@ -177,9 +181,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
                     dwell.summary.flagged = was.summary.flagged;
                     dwell.reason = was.reason;
                 }
-                const std::string what = dwell_difference(out.dwells.size(), was, dwell);
-                if (!what.empty()) ++out.different;
-                if (out.first_difference.empty()) out.first_difference = what;
+                note_difference(dwell_difference(out.dwells.size(), was, dwell));
             }
             if (options.on_dwell) options.on_dwell(dwell);
             out.dwells.push_back(std::move(dwell));
@@ -212,6 +214,8 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     play_until(samples.size());
     take();
     estimates.end();
+    note_difference(row_difference(campaign, out.dwells.size()));
+    note_difference(level_difference(campaign, recorded));
     out.estimates = estimates.compared();
     out.estimates_different = estimates.different();
     if (out.first_difference.empty()) out.first_difference = estimates.first_difference();

@@ -324,6 +324,7 @@ Analysis analyse(const Campaign& campaign, const configuration::Configuration& r
                                   out.replayed.rows, record::shaken_of(campaign, rig));
     out.at_hz = frequencies_of(judgement, settings);
     out.assessed = std::move(judgement.assessed);
+    out.spectrum = std::move(judgement.spectrum);
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

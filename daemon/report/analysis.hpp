@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,9 @@ struct Analysis {
     record::ReplayResult replayed;
     Coefficients coefficients;                    ///< of a constant bias, sigma of noise alone
     estimator::uncertainty::Assessment assessed;  ///< over frequency, where there are several
+    std::optional<tool::SpectrumResult> spectrum;
+    /// Where the recording's own result is not what the replay gives; empty: nowhere.
+    std::string not_as_recorded;
     Frequencies at_hz{};
     std::string anew_with;  ///< the settings' file; empty: those of the recording
     estimator::Settings settings;

@@ -83,7 +83,9 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
                                 std::string(estimator::compiler()) + ", " +
                                 std::string(estimator::instruction_set())},
               {"Replay",
-               !a.anew_with.empty()       ? "not compared: identified anew with other settings"
+               !a.anew_with.empty() ? "not compared: identified anew with other settings"
+               : !a.not_as_recorded.empty()
+                   ? "!the recording's result is not that of its dwells: " + a.not_as_recorded
                : a.replayed.compared == 0 ? "no dwell to compare"
                : a.replayed.as_recorded()
                    ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/filter/text.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/uncertainty/coverage.hpp"
 #include "estimator/uncertainty/verdict.hpp"
@@ -100,6 +101,23 @@ void doubt(uncertainty::Assessment& assessed, const std::string& text,
            uncertainty::Level level = uncertainty::Level::doubtful) {
     assessed.verdict.reasons.push_back({"spectrum", text, level});
     uncertainty::conclude(assessed, assessed.verdict);
+}
+
+/// Of the dwells at other frequencies no pattern is looked for: that they do not fit is told here.
+/// Seven dwells for six coefficients do not tell which of them it is.
+void tell_fit(const SpectrumResult& of, uncertainty::Assessment& to) {
+    const GroupedFit& fit = of.analysis.fit;
+    if (!(fit.p < kAlarm) || fit.degrees < uncertainty::kFewestDegrees) return;
+    const auto& kind = of.table.list()[fit.worst_rate / estimator::kGyros].kind;
+    const Kind* of_kind = kind ? &of.table.kinds()[*kind] : nullptr;
+    const std::string with = of_kind == nullptr ? "at rest"
+                             : of_kind->profile.empty()
+                                 ? estimator::text("at %.4g Hz", of_kind->hz())
+                                 : "under " + of_kind->profile;
+    doubt(to,
+          estimator::text("the dwells do not fit coefficients of each frequency (chi-square "
+                          "%.0f of %d), gyro %c %s least: taken into u",
+                          fit.chi_square, fit.degrees, "xyz"[fit.worst_rate % 3], with.c_str()));
 }
 
 /// Of coefficients that the dwells at the reference frequency leave open: which all of them do not.
@@ -238,6 +256,7 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
               "over frequency nothing is freed: an error in what estimator.free names is in the "
               "coefficients",
               uncertainty::Level::not_valid);
+    tell_fit(spectrum, assessed);
     // A resonance that is a little likelier than none is no explanation.
     const bool explained =
         of.form == Form::resonance &&

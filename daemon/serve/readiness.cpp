@@ -119,6 +119,7 @@ Readiness readiness(const StatusData& status) {
             : !guard.text.empty()   ? guard.text
             : !guard.sees           ? "sees no accelerometer"
             : !guard.reaches_shaker ? "does not reach the shaker"
+            : !guard.note.empty()   ? "watches, " + guard.note
                                     : "watches");
     if (const auto& outside = status.annunciator; outside.horn || outside.command)
         add("annunciator", outside.confirms && outside.command_note.empty(),

@@ -167,7 +167,8 @@ std::string guard_line(const v1::Guard& guard) {
     if (!guard.heard()) return "NOT HEARD, " + guard.note();
     if (!guard.text().empty()) return guard.cause() + ": " + guard.text();
     if (!guard.sees()) return "SEES NO ACCELEROMETER";
-    return guard.reaches_shaker() ? "watches" : "DOES NOT REACH THE SHAKER";
+    if (!guard.reaches_shaker()) return "DOES NOT REACH THE SHAKER";
+    return guard.note().empty() ? "watches" : "watches, " + guard.note();
 }
 
 std::string broker_line(const v1::Mqtt& mqtt) {

@@ -379,6 +379,11 @@ void fill(v1::Status& out, const StatusData& status) {
 
 namespace {
 
+void fill_weights(auto& out, const std::vector<std::pair<std::string, double>>& weights) {
+    for (const auto& [name, weight] : weights)
+        (*out.mutable_weights())[proto::mend_utf8(name)] = finite(weight);
+}
+
 void fill(v1::Assessed& out, const VerdictStatus& verdict) {
     out.set_dwells(verdict.dwells);
     out.set_verdict(verdict.word);
@@ -390,6 +395,13 @@ void fill(v1::Assessed& out, const VerdictStatus& verdict) {
         if (!std::isfinite(u)) continue;
         set(to, &v1::Assessed::Coefficient::set_value, value);
         set(to, &v1::Assessed::Coefficient::set_u, u);
+    }
+    if (!verdict.combinations) return;
+    for (const auto& determined : *verdict.combinations) {
+        v1::Assessed::Combination& to = *out.add_combinations();
+        fill_weights(to, determined.weights);
+        set(to, &v1::Assessed::Combination::set_value, determined.value);
+        set(to, &v1::Assessed::Combination::set_u, determined.u);
     }
 }
 
@@ -423,9 +435,7 @@ void fill(v1::Parameters& out, const estimator::Result& result, const VerdictSta
     }
     for (const estimator::Combination& determined : result.combinations) {
         v1::Combination& combination = *out.add_combinations();
-        for (const auto& [name, weight] : determined.weights) {
-            (*combination.mutable_weights())[proto::mend_utf8(name)] = finite(weight);
-        }
+        fill_weights(combination, determined.weights);
         set(combination, &v1::Combination::set_value, determined.value);
         set(combination, &v1::Combination::set_sigma, determined.sigma);
     }

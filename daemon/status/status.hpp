@@ -161,6 +161,12 @@ struct VerdictStatus {
         double value = 0, u = 0;
     };
     std::shared_ptr<const std::array<Coefficient, estimator::kParameters>> coefficients = {};
+    /// What is determined of those that are not.
+    struct Combination {
+        std::vector<std::pair<std::string, double>> weights;
+        double value = 0, u = 0;
+    };
+    std::shared_ptr<const std::vector<Combination>> combinations = {};
 };
 
 /// What shakes on a rig with several kinds of vibration: as it is commanded, read back and seen. g

@@ -413,6 +413,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("guard.reaches_shaker", "", [](auto& s) { return only(s.guard.heard, s.guard.reaches_shaker); }),
     row("guard.horn_confirms", "", [](auto& s) { return only(s.guard.heard, s.guard.horn_confirms); }),
     row("guard.table_g", "g", [](auto& s) { return only(s.guard.heard, s.guard.table_g); }),
+    row("guard.version", "", [](auto& s) { return s.guard.version; }),
     row("annunciator.horn", "", [](auto& s) { return s.annunciator.horn; }),
     row("annunciator.confirms", "", [](auto& s) { return s.annunciator.confirms; }),
     row("", "", [](auto& s) { return only(s.annunciator.horn, s.annunciator.confirms); })

@@ -10,8 +10,10 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/study/rig_keys.hpp"
 #include "daemon/study/statistics.hpp"
+#include "estimator/commissioning/contradiction.hpp"
 #include "estimator/filter/angles.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::study {
@@ -161,6 +163,10 @@ class Bench {
         return player_.book().noise().found();
     }
     [[nodiscard]] estimator::Result result() { return player_.book().identification().result(); }
+    /// Of its dwells.
+    [[nodiscard]] const std::vector<estimator::DwellMeans>& means() {
+        return player_.book().identification().means();
+    }
     /// Mean over the samples: what an identification of a rig that drifts is to be judged by.
     [[nodiscard]] double truth(std::size_t i) const {
         return truth_[i] / static_cast<double>(count_);
@@ -206,7 +212,10 @@ CampaignRecord campaign(const estimator::Settings& settings, const plant::Campai
     if (found) playing = played(found);
     Bench& bench = *playing;
     const auto result = bench.result();
-    const auto assessed = dwells::assess(settings, found, result);
+    auto assessed = dwells::assess(settings, found, result);
+    // As the daemon at a campaign's end: a rig that is not what the configuration says.
+    uncertainty::contradict(assessed.verdict, estimator::commissioning::first_contradiction(
+                                                  settings, result.dwells, bench.means()));
     CampaignRecord record;
     record.hours = bench.hours();
     record.verdict = static_cast<std::uint8_t>(assessed.verdict.level);
@@ -245,8 +254,15 @@ std::size_t combination_of(const Study& study, std::uint64_t point) {
     return combination;
 }
 
-Checked check_campaigns(const Study& study, const std::string& file) {
-    Checked out;
+Effective configuration_of(const Study& study, const std::string& file) {
+    Effective out;
+    for (auto& one : load_settings(settings_at(study, study.place_of(0)), file).effective)
+        out.emplace_back(one.key, one.value);
+    return out;
+}
+
+Sequences check_campaigns(const Study& study, const std::string& file) {
+    Sequences out;
     const Json base = Json::parse(plant::to_json(plant::Truth{}));
     Study only_settings = study;
     std::erase_if(only_settings.grid, [](const Axis& axis) { return axis.settings.empty(); });
@@ -256,11 +272,7 @@ Checked check_campaigns(const Study& study, const std::string& file) {
     for (std::uint64_t point = 0; point < only_settings.points(); ++point) {
         const auto loaded =
             load_settings(settings_at(only_settings, only_settings.place_of(point)), file);
-        if (point == 0) {
-            for (const auto& one : loaded.effective)
-                out.configuration.emplace_back(one.key, one.value);
-        }
-        out.sequences.push_back(visit_sequence(loaded.configuration));
+        out.push_back(visit_sequence(loaded.configuration));
     }
     // Every value of the rig once, with the first of the others.
     std::vector<std::vector<std::size_t>> places{study.place_of(0)};

@@ -22,12 +22,11 @@ using Sequences = std::vector<std::vector<std::size_t>>;
 
 /// Checks every value of the grid, and finds the orders. `file` is the study's name in messages.
 /// Throws StudyError.
-struct Checked {
-    Sequences sequences;
-    /// Effective, of the first point: keys and values.
-    std::vector<std::pair<std::string, std::string>> configuration;
-};
-[[nodiscard]] Checked check_campaigns(const Study& study, const std::string& file);
+[[nodiscard]] Sequences check_campaigns(const Study& study, const std::string& file);
+
+/// The effective configuration of the first point: keys and values.
+using Effective = std::vector<std::pair<std::string, std::string>>;
+[[nodiscard]] Effective configuration_of(const Study& study, const std::string& file);
 
 /// Simulates and identifies.
 class CampaignWorker final : public Worker {

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -101,7 +102,7 @@ Json grid_of(const Study& study) {
     return grid;
 }
 
-Json plan_json(const Study& study, const std::string& text, const Checked& checked,
+Json plan_json(const Study& study, const std::string& text, const Sequences& sequences,
                const std::string& instruction_set) {
     Json plan;
     plan["format"] = kFormat;
@@ -117,10 +118,9 @@ Json plan_json(const Study& study, const std::string& text, const Checked& check
         return plan;
     }
     plan["grid"] = grid_of(study);
-    plan["sequences"] = checked.sequences;
-    Json configuration = Json::object();
-    for (const auto& [key, value] : checked.configuration) configuration[key] = value;
-    plan["configuration"] = configuration;
+    plan["sequences"] = sequences;
+    for (const auto& [key, value] : configuration_of(study, kStudyFile))
+        plan["configuration"][key] = value;
     return plan;
 }
 
@@ -167,14 +167,14 @@ Folder plan_study(const std::string& file, const std::string& folder,
                   const std::string& instruction_set) {
     const std::string text = read_text(file, kLargestFile);
     Study study = parse_study(text, file);
-    Checked checked;
+    Sequences sequences;
     if (study.kind == "recordings") {
         study.recordings = find_recordings(study, file);
         study.runs = study.recordings.size();
     } else if (study.kind == "uncertainty") {
         study.recordings = {find_recording(study, file)};
     } else {
-        checked = check_campaigns(study, file);
+        sequences = check_campaigns(study, file);
     }
     const std::string set = use_set(instruction_set);
     if (::mkdir(folder.c_str(), 0755) != 0) {
@@ -189,7 +189,7 @@ Folder plan_study(const std::string& file, const std::string& folder,
     try {
         if (::mkdir((folder + "/parts").c_str(), 0755) != 0) cannot(folder + "/parts", "made");
         write_text(folder + "/" + kStudyFile, text);
-        write_text(folder + "/" + kPlanFile, plan_json(study, text, checked, set).dump(1) + "\n");
+        write_text(folder + "/" + kPlanFile, plan_json(study, text, sequences, set).dump(1) + "\n");
     } catch (const std::exception&) {
         std::error_code ignored;
         fs::remove_all(folder, ignored);
@@ -223,6 +223,10 @@ Folder open_study(const std::string& path) {
         key = campaigns ? "sequences" : "recordings";
         if (campaigns) out.sequences = plan.at(key).get<Sequences>();
         if (!campaigns) recordings = recordings_of(plan.at(key));
+        key = "configuration";
+        if (campaigns)
+            for (const auto& [name, value] : plan.at(key).items())
+                out.configuration.emplace_back(name, value);
     } catch (const Json::exception&) {
         throw StudyError(plan_path + ": " + key + ": found " +
                          (plan.contains(key) ? plan[key].dump().substr(0, 40) : "nothing") +
@@ -243,6 +247,25 @@ Folder open_study(const std::string& path) {
     return out;
 }
 
+namespace {
+
+/// Defaults may have changed under a study, and a plan by a hand.
+void check_configuration(const Folder& folder) {
+    const Effective here = configuration_of(folder.study, folder.path + "/" + kStudyFile);
+    const Effective& planned = folder.configuration;
+    const auto [found, expected] =
+        std::mismatch(planned.begin(), planned.end(), here.begin(), here.end());
+    const auto words = [](auto at, auto end) {
+        return at == end ? std::string("nothing") : at->first + " " + at->second;
+    };
+    if (found != planned.end() || expected != here.end())
+        throw StudyError(folder.path + "/" + kPlanFile + ": configuration: found " +
+                         words(found, planned.end()) + ", expected " + words(expected, here.end()) +
+                         ", as " + kStudyFile + " gives it here: plan it anew");
+}
+
+}  // namespace
+
 void prepare_to_run(const Folder& folder) {
     const auto differs = [&](const char* what, const std::string& planned,
                              const std::string& here) {
@@ -254,6 +277,7 @@ void prepare_to_run(const Folder& folder) {
     differs("compiler", folder.compiler, std::string(estimator::compiler()));
     use_set(folder.instruction_set);
     differs("arithmetic", folder.arithmetic, arithmetic());
+    if (folder.study.kind == "campaigns") check_configuration(folder);
     check_recordings(folder.study);
 }
 

@@ -15,6 +15,7 @@ struct Folder {
     std::string path;
     Study study;
     Sequences sequences;
+    Effective configuration;  ///< of a study of campaigns, as planned
     StudyId id{};
     std::string id_text;  ///< hexadecimal
     std::string version, compiler, instruction_set, arithmetic;

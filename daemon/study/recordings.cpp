@@ -17,8 +17,10 @@
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/campaigns.hpp"
 #include "daemon/study/identified_recording.hpp"
+#include "estimator/commissioning/contradiction.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/verdict.hpp"
 #include "proto/json_number.hpp"
 #include "proto/json_text.hpp"
 
@@ -190,6 +192,10 @@ IdentifiedRecording identify_recording(const Recording& recording,
     out.assessed = tool::assess(out.settings, out.replayed.found, out.replayed.result,
                                 out.replayed.rows, record::shaken_of(campaign, loaded))
                        .assessed;
+    // As whoever else looks at it says: replay, identify, report, compensate and certificate.
+    uncertainty::contradict(out.assessed.verdict,
+                            estimator::commissioning::first_contradiction(
+                                out.settings, out.replayed.result.dwells, out.replayed.means));
     out.settings = dwells::Anew::settings_of(out.settings, out.replayed.found);
     return out;
 }

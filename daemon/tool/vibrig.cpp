@@ -4,6 +4,7 @@
 
 #include "daemon/tool/commands.hpp"
 #include "proto/command_tree.hpp"
+#include "proto/empty_element.hpp"
 #include "proto/empty_value.hpp"
 #include "proto/named_files.hpp"
 
@@ -40,6 +41,7 @@ int main(int argc, char** argv) {
         return kBadInput;
     }
     try {
+        vibrig::proto::refuse_empty_elements(app, {argv + 1, argv + argc});
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         // CLI11 has codes of its own for each kind of bad usage; people and scripts get one.

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <system_error>
 
+#include "daemon/version.hpp"
 #include "proto/safety.hpp"
 
 namespace vibrig::watch {
@@ -125,9 +126,13 @@ void GuardLink::listen() {
         if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
         if (size <= 0) return hang_up("it has gone");
         const auto word = proto::decode_guard_word({bytes.data(), static_cast<std::size_t>(size)});
-        // An answer to what was said in another life of either does not count.
-        if (!word || word->sequence == 0 || word->sequence > sequence_) continue;
         const std::lock_guard lock(mutex_);
+        if (!word) {
+            note_ = path_ + ": answers what this version does not know: restart vibrig-guard";
+            continue;
+        }
+        // An answer to what was said in another life of either does not count.
+        if (word->sequence == 0 || word->sequence > sequence_) continue;
         word_ = *word;
         heard_ns_ = steady_ns();
         note_.clear();
@@ -167,10 +172,12 @@ GuardStatus GuardLink::status() const {
     status.socket = path_;
     const std::lock_guard lock(mutex_);
     status.heard = fresh(heard_ns_);
-    status.note = status.heard    ? std::string()
-                  : note_.empty() ? "no word within its deadline"
-                                  : note_;
+    status.note = note_.empty() ? "no word within its deadline" : note_;
     if (!status.heard) return status;  // what it said last it may not say any more
+    status.version = word_.version.data();
+    status.note = status.version == kVersion ? ""
+                                             : "version " + status.version + ", vibrigd is " +
+                                                   kVersion + ": restart vibrig-guard";
     status.cause = proto::name_of(word_.cause);
     status.text = word_.cause == proto::GuardCause::none ? "" : proto::text_of(word_.cause);
     status.disobeyed = word_.disobeyed;

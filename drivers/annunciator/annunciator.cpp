@@ -37,9 +37,14 @@ Annunciator::Annunciator(const AnnunciatorSettings& settings, Say said)
         command_ = std::make_unique<PageCommand>(settings_.command, settings_.command_limit);
     status_.horn = horn_ != nullptr;
     status_.command = command_ != nullptr;
-    if (!horn_ && !command_) return;
-    thread_ = std::thread([this] { run(); });
-    ::pthread_setname_np(thread_.native_handle(), "annunciator");
+    if (horn_) {
+        horn_thread_ = std::thread([this] { run_horn(); });
+        ::pthread_setname_np(horn_thread_.native_handle(), "horn");
+    }
+    if (command_) {
+        pager_thread_ = std::thread([this] { run_pager(); });
+        ::pthread_setname_np(pager_thread_.native_handle(), "pager");
+    }
 }
 
 Annunciator::~Annunciator() {
@@ -47,8 +52,9 @@ Annunciator::~Annunciator() {
         const std::lock_guard lock(mutex_);
         quit_ = true;
     }
-    changed_.notify_one();
-    if (thread_.joinable()) thread_.join();
+    changed_.notify_all();
+    for (std::thread* const thread : {&pager_thread_, &horn_thread_})
+        if (thread->joinable()) thread->join();
 }
 
 void Annunciator::show(HornPattern pattern) {
@@ -58,7 +64,7 @@ void Annunciator::show(HornPattern pattern) {
         pattern_ = pattern;
         if (!horn_) status_.pattern = pattern;
     }
-    changed_.notify_one();
+    changed_.notify_all();
 }
 
 void Annunciator::announce(HornPattern kind, const std::string& text) {
@@ -72,7 +78,7 @@ void Annunciator::announce(HornPattern kind, const std::string& text) {
         }
         waiting_.push_back(std::move(json));
     }
-    changed_.notify_one();
+    changed_.notify_all();
 }
 
 AnnunciatorStatus Annunciator::status() const {
@@ -151,37 +157,27 @@ void Annunciator::page(Time now) {
     if (!wrong.empty() && said_) said_(false, wrong);
 }
 
-void Annunciator::run() {
-    Time horn_due = 0;
+void Annunciator::run_horn() {
     for (;;) {
-        // Somebody is paged before the horn is reached: its name may have to be looked up, which
-        // takes as long as the resolver wants.
-        if (command_) page(steady_now());
-        const Time now = steady_now();
-        if (horn_ && now >= horn_due) {
-            sound(now);
-            horn_due = horn_->next(steady_now());
-        }
+        sound(steady_now());
+        const Time left = horn_->next(steady_now()) - steady_now();
         std::unique_lock lock(mutex_);
-        const auto woken = [&] {
-            return quit_ || (horn_ && pattern_ != shown_) ||
-                   (!waiting_.empty() && command_ && command_->has_room());
-        };
-        if (command_ && !command_->idle()) {
-            changed_.wait_for(lock, kLookAtRuns, woken);
-        } else if (!horn_) {
-            changed_.wait_for(lock, kCommandPeriod, woken);
-        } else {
-            changed_.wait_for(
-                lock,
-                std::chrono::nanoseconds(std::max<Time>(horn_due - steady_now(), kMillisecond)),
-                woken);
-        }
+        changed_.wait_for(lock, std::chrono::nanoseconds(std::max<Time>(left, kMillisecond)),
+                          [&] { return quit_ || pattern_ != shown_; });
         if (quit_) break;
-        if (pattern_ != shown_) horn_due = 0;
     }
     // Nobody would end it; only a table that obeys no stop is left sounding.
-    if (horn_ && shown_ != HornPattern::disobeyed) horn_->show(HornPattern::none, steady_now());
+    if (shown_ != HornPattern::disobeyed) horn_->show(HornPattern::none, steady_now());
+}
+
+void Annunciator::run_pager() {
+    for (;;) {
+        page(steady_now());
+        std::unique_lock lock(mutex_);
+        changed_.wait_for(lock, command_->idle() ? kCommandPeriod : kLookAtRuns,
+                          [&] { return quit_ || (!waiting_.empty() && command_->has_room()); });
+        if (quit_) break;
+    }
 }
 
 }  // namespace vibrig::drivers

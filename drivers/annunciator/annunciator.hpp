@@ -31,12 +31,13 @@ struct AnnunciatorStatus {
     std::string command_note;  ///< what went wrong with the newest, or why it cannot be run
 };
 
-/// Horn, lamp and pager, on a thread of its own and in wall time. show() and announce() may be
-/// called in any thread that is not real-time; they wait for nothing outside.
+/// Horn with lamp, and pager, on a thread each and in wall time: no page waits for the horn, whose
+/// name may have to be looked up, which takes as long as the resolver wants. show() and announce()
+/// may be called in any thread that is not real-time; they wait for nothing outside.
 class Annunciator {
   public:
-    /// Throws ShakerError for settings that cannot work. `said`, from its own thread: one line when
-    /// horn or command stop to work, and when they work again.
+    /// Throws ShakerError for settings that cannot work. `said`, from both threads, perhaps at
+    /// once: one line when horn or command stop to work, and when they work again.
     using Say = std::function<void(bool good, const std::string& text)>;
     Annunciator(const AnnunciatorSettings& settings, Say said);
     ~Annunciator();
@@ -50,7 +51,8 @@ class Annunciator {
     [[nodiscard]] AnnunciatorStatus status() const;
 
   private:
-    void run();
+    void run_horn();
+    void run_pager();
     void sound(Time now);
     void page(Time now);
     void check_command(Time now);
@@ -58,11 +60,11 @@ class Annunciator {
 
     const AnnunciatorSettings settings_;
     const Say said_;
-    std::unique_ptr<Horn> horn_;
-    std::unique_ptr<PageCommand> command_;
+    std::unique_ptr<Horn> horn_;  ///< of its thread, as what follows
     HornPattern shown_ = HornPattern::none;
     int bad_reads_ = 0;
-    std::string trouble_;  ///< of the command, as last looked at
+    std::unique_ptr<PageCommand> command_;  ///< of the pager's thread, as what follows
+    std::string trouble_;                   ///< of the command, as last looked at
     Time check_due_ = 0;
 
     mutable std::mutex mutex_;  ///< guards what follows; never held while horn or command are busy
@@ -72,7 +74,7 @@ class Annunciator {
     AnnunciatorStatus status_;
     bool quit_ = false;
 
-    std::thread thread_;
+    std::thread horn_thread_, pager_thread_;
 };
 
 }  // namespace vibrig::drivers

@@ -150,6 +150,7 @@ struct SampleAssembler::Impl {
     std::array<bool, kChannels> ever_good{};
     PlatformStatus platform;
     Time loop_time = 0, fault_time = 0;  ///< of its newest frame
+    Time position_time = 0, slewing_time = 0, echo_time = 0;
     Time newest_frame = 0;
     Time sync_time = 0, sync_period = 0;  ///< of its newest frame; about how often they come
     AssemblerCounters counters;
@@ -388,7 +389,8 @@ bool SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
         if (!value) continue;
         if (c.validity) {
             sample.has_validity[c.channel] = true;
-            sample.valid[c.channel] = *value != 0;
+            // A code for an error, or for not available, is none for valid.
+            sample.valid[c.channel] = *value != 0 && !proto::out_of_range(*c.signal, *value);
         } else {
             sample.has_value[c.channel] = true;
             sample.in_range[c.channel] =
@@ -406,8 +408,13 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
     for (const MessagePlan::StatusSignal& s : message.status) {
         if (!proto::present(*message.message, *s.signal, payload)) continue;
         const std::optional<double> value = proto::decode(*s.signal, payload);
-        if (!value || !std::isfinite(*value) || proto::out_of_range(*s.signal, *value)) continue;
-        take_status(*s.row, *value, frame.time);
+        if (!value) continue;
+        const auto flag = s.row->flag;
+        if (!proto::out_of_range(*s.signal, *value))
+            take_status(*s.row, *value, frame.time);
+        else if (flag == &PlatformStatus::ready || flag == &PlatformStatus::gyros_at_speed)
+            // The others grow old by it; these have no age, as they may be sent on change alone.
+            platform.*flag = false;
     }
 }
 
@@ -426,7 +433,15 @@ void SampleAssembler::Impl::take_status(const StatusRow& row, double value, Time
         platform.temperature_time = time;
     }
     if (row.of_gimbals) {
-        platform.gimbal_time = time;
+        Time& its = row.flag == &PlatformStatus::in_position ? position_time
+                    : row.flag == &PlatformStatus::slewing   ? slewing_time
+                                                             : echo_time;
+        its = time;
+        const auto& names = settings.bindings;
+        const auto of = [&](const std::string& name, Time at) { return name.empty() ? time : at; };
+        platform.gimbal_time =
+            std::min({of(names.in_position, position_time), of(names.slewing, slewing_time),
+                      of(names.command_echo, echo_time)});
         return;
     }
     if (row.flag == &PlatformStatus::loop_closed) loop_time = time;

@@ -106,7 +106,9 @@ struct PlatformStatus {
     [[nodiscard]] bool knows_temperature(Time now) const noexcept {
         return temperature_time > 0 && now - temperature_time <= kTemperatureDeadline;
     }
-    Time gimbal_time = 0;  ///< of the newest gimbal status frame; 0: none yet
+    /// As old as what is oldest of in_position, slewing and the echo, of those that are bound; 0:
+    /// one of them has not come yet.
+    Time gimbal_time = 0;
     bool in_position = false;
     bool slewing = false;
     std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted

@@ -165,11 +165,13 @@ ModbusLink::Connection ModbusLink::connect_tcp(std::string& why) {
         }
         addresses_.reset(found);
     }
+    // The one that answered last is the first: a dead one before it would cost a stop the response
+    // timeout.
     Connection result = Connection::failed;
-    for (const addrinfo* address = addresses_.get(); address != nullptr;
-         address = address->ai_next) {
-        result = connect_address(*address, why);
-        if (result != Connection::failed) return result;
+    if (answered_ != nullptr) result = connect_address(*answered_, why);
+    for (const addrinfo* address = addresses_.get();
+         address != nullptr && result == Connection::failed; address = address->ai_next) {
+        if (address != answered_) result = connect_address(*address, why);
     }
     return result;
 }
@@ -201,6 +203,7 @@ ModbusLink::Connection ModbusLink::connect_address(const addrinfo& address, std:
         return Connection::failed;
     }
     modbus_set_socket(context_.get(), socket);
+    address_ = &address;
     return Connection::open;
 }
 
@@ -239,11 +242,12 @@ Reply ModbusLink::hindered() noexcept {
 }
 
 Reply ModbusLink::reply_of(int result, int expected, int error) noexcept {
+    const bool exception = result < 0 && error > MODBUS_ENOBASE && error <= EMBXSBUSY;
+    if (result == expected || exception) answered_ = address_;
     if (result == expected) return {};
     if (result >= 0) return {ReplyKind::wrong, EMBBADDATA};
     if (error == ETIMEDOUT) return {ReplyKind::timeout, error};
-    if (error > MODBUS_ENOBASE && error <= EMBXSBUSY)
-        return {ReplyKind::exception, error - MODBUS_ENOBASE};
+    if (exception) return {ReplyKind::exception, error - MODBUS_ENOBASE};
     if (error > MODBUS_ENOBASE) return {ReplyKind::wrong, error};
     return {ReplyKind::lost, error};
 }

@@ -43,7 +43,8 @@ class ModbusLink {
     ModbusLink& operator=(const ModbusLink&) = delete;
 
     enum class Connection : std::uint8_t { open, failed, out_of_descriptors };
-    /// One attempt; `why` gets one line when it fails.
+    /// One attempt at each address of the name, the one that answered last first; `why` gets one
+    /// line when it fails.
     [[nodiscard]] Connection connect(std::string& why);
     void close() noexcept;
     [[nodiscard]] bool connected() const noexcept { return connected_; }
@@ -86,13 +87,16 @@ class ModbusLink {
     [[nodiscard]] Connection connect_rtu(std::string& why);
     void arm_cutter(int socket) noexcept;
     [[nodiscard]] Reply hindered() noexcept;
-    [[nodiscard]] static Reply reply_of(int result, int expected, int error) noexcept;
+    [[nodiscard]] Reply reply_of(int result, int expected, int error) noexcept;
 
     ShakerSettings settings_;
     std::string name_;
     std::unique_ptr<_modbus, FreeModbus> context_;
     std::unique_ptr<addrinfo, FreeAddresses>
         addresses_;  ///< kept while they work: a name server may be gone
+    // Of those: a peer that takes connections and answers nothing is not preferred.
+    const addrinfo* address_ = nullptr;   ///< of the newest connection
+    const addrinfo* answered_ = nullptr;  ///< whose peer answered last
     // cut() shuts down whatever this number refers to: dup3() makes it the present socket or, while
     // there is none, something inert. The number itself lives as long as the link, so it can never
     // hit a foreign descriptor.

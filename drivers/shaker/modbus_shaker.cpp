@@ -116,7 +116,7 @@ ShakerReading ModbusShaker::reading() const noexcept {
     ShakerReading reading = latest_.load();
     // One lost reply and the reconnect after it are lived through; the watchdog waits longer still.
     const Time lifetime = std::max(3 * settings_.poll_period, 2 * settings_.watchdog_period);
-    if (clock_.now() - reading.time > lifetime) reading.valid = false;
+    if (clock_.now() - reading.time > lifetime) reading.fresh = reading.valid = false;
     return reading;
 }
 
@@ -520,10 +520,10 @@ void ModbusShaker::check_timeout(Time now) {
     if (!reply.ok() && reply.kind != ReplyKind::exception) return;
     static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), ours));
     timeout_read_s_ = reply.ok() ? proto::decode(reg, raw) : 0;
-    const bool good =
-        reg.access == proto::Access::read
-            ? timeout_read_s_ > 0 && timeout_read_s_ <= to_seconds(kLongestWatchdogTimeout)
-            : reply.ok() && same_raw(reg, ours, raw);
+    // What was written may have been rounded to nothing, which switches many watchdogs off.
+    const bool good = timeout_read_s_ > 0 &&
+                      timeout_read_s_ <= to_seconds(kLongestWatchdogTimeout) &&
+                      (reg.access == proto::Access::read || same_raw(reg, ours, raw));
     const auto seen = good ? WatchdogTimeout::kept : WatchdogTimeout::changed;
     if (std::exchange(timeout_seen_, seen) != seen) next_poll_ = now;  // to be reported at once
     settle(good ? "read back"

@@ -137,7 +137,8 @@ struct ShakerPsd {
 /// The newest read-back. Nothing of it is valid while `valid` is false.
 struct ShakerReading {
     Time time = 0;
-    bool valid = false;       ///< false when older than 3 polls and 2 feeds
+    bool fresh = false;       ///< not older than 3 polls and 2 feeds: its words are known
+    bool valid = false;       ///< fresh, and its numbers are numbers
     double frequency_hz = 0;  ///< set-point read back
     double amplitude_g = 0;   ///< set-point read back, peak at the table
     double measured_g = 0;    ///< measured, peak at the table

@@ -110,6 +110,7 @@ ShakerReading ShakerImage::reading(Time time) noexcept {
     reading.fault = to_u16(value_of(registers_.fault));
     reading.running = value_of(registers_.run) != 0;
     reading.emergency_stop_open = value_of(registers_.emergency_stop) != 0;
+    reading.fresh = true;
     reading.valid = std::isfinite(reading.frequency_hz) && std::isfinite(reading.amplitude_g) &&
                     std::isfinite(reading.measured_g);
     if (registers_.random) reading.random = random_reading(*registers_.random);

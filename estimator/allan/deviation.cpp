@@ -130,7 +130,7 @@ Statistic statistic_named(const std::string& name) {
         if (name == kNames[i]) return static_cast<Statistic>(i);
         all += std::string(all.empty() ? "" : ", ") + kNames[i];
     }
-    throw DataError("type: \"" + name + "\" found, expected one of " + all);
+    throw DataError("--type: \"" + name + "\" found, expected one of " + all);
 }
 
 std::size_t largest_factor(Statistic statistic, std::size_t rates) {

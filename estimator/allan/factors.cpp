@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -53,11 +54,13 @@ std::vector<std::size_t> factors_of(std::span<const double> taus, double tau0,
         const double m = std::round(ratio);
         if (!(ratio > 0) || std::abs(ratio - m) > 1e-6 * m)
             throw DataError(
-                text("taus: %g s found, expected a multiple of tau0 = %g s", tau, tau0));
+                text("--taus: %g s found, expected a multiple of tau0 = %g s", tau, tau0));
         if (m > static_cast<double>(largest))
-            throw DataError(text("taus: %g s found, the record allows at most %g s", tau,
+            throw DataError(text("--taus: %g s found, the record allows at most %g s", tau,
                                  static_cast<double>(largest) * tau0));
         factors.push_back(static_cast<std::size_t>(m));
+        if (std::count(factors.begin(), factors.end(), factors.back()) > 1)
+            throw DataError(text("--taus: %g s found twice, expected each once", tau));
     }
     return factors;
 }

@@ -19,5 +19,10 @@ struct Contradiction {
 [[nodiscard]] Contradiction contradiction_of(const Settings& settings,
                                              const std::vector<DwellSummary>& dwells,
                                              const std::vector<DwellMeans>& means);
+/// The first of it alone, for whoever judges thousands: without the search for what would explain
+/// it.
+[[nodiscard]] std::string first_contradiction(const Settings& settings,
+                                              const std::vector<DwellSummary>& dwells,
+                                              const std::vector<DwellMeans>& means);
 
 }  // namespace vibrig::estimator::commissioning

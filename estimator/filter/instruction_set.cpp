@@ -52,7 +52,8 @@ std::string_view instruction_set() noexcept { return chosen()->name; }
 
 std::string_view compiler() noexcept {
 #ifdef __clang__
-    return "clang++ " __clang_version__;
+    constexpr std::string_view kName = "clang++ " __clang_version__;  // which may end with a blank
+    return kName.substr(0, kName.find_last_not_of(' ') + 1);
 #else
     return "g++ " __VERSION__;
 #endif

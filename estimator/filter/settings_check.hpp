@@ -17,6 +17,9 @@ void check(const Settings& settings);
 struct DoubtfulKey {
     std::string key;  ///< "platform.gyro_y_axes", with [0] for the input axis
     std::string found, expected;
+    [[nodiscard]] std::string words() const {
+        return key + ": found " + found + ", expected " + expected;
+    }
 };
 /// Gyro axes: an input axis that is not the gyro's own (or two gyros' at once), a left-handed triad
 /// of input, output and spin axis. Motion across the vertical that is neither measured nor

@@ -141,10 +141,12 @@ Counts exact_design(const Problem& problem, std::size_t runs, const ExactSearch&
         if (search.done[i] > 0) ++done;
     }
     if (runs + done < problem.coefficients()) {
-        const std::string needed = std::to_string(problem.coefficients());
-        throw PlanError(std::to_string(runs) + " runs" +
-                        (done > 0 ? " and " + std::to_string(done) + " points that are done" : "") +
-                        " for " + needed + " coefficients: " + needed + " are needed at least");
+        const std::size_t needed = problem.coefficients();
+        throw PlanError(
+            "--runs: found " + std::to_string(runs) + ", expected " +
+            std::to_string(needed - done) + " at least for " + std::to_string(needed) +
+            " coefficients" +
+            (done > 0 ? " with " + std::to_string(done) + " points that are done" : ""));
     }
     std::size_t starts = search.starts;
     if (starts == 0) {

@@ -12,6 +12,7 @@
 #include "estimator/uncertainty/breaks.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/drift_states.hpp"
+#include "estimator/uncertainty/fit.hpp"
 #include "estimator/uncertainty/signatures.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -300,7 +301,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     out.groups.sigma.resize(columns, 3);
     std::array<GyroProblem, 3> problems;
     std::array<uncertainty::DriftAverage, 3> groups;
-    std::array<MatrixXd, 3> if_flat, gains;
+    std::array<MatrixXd, 3> noise, if_flat, gains;
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -314,6 +315,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
             scattered |= average.weights.scatter > 0.5;
+            noise[j] = gyro.variance.asDiagonal();
             problems[j] = {gyro.rate, uncertainty::mean_covariance(gyro, average), prior.col(g)};
             for (const Sweep& sweep : sweeps) problems[j].swept.emplace_back(settings, sweep, j);
             if (table.kinds().size() > 1)
@@ -323,14 +325,13 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     }
     const DeclaredRates declared =
         declared_rates(settings, table, out.groups.value, out.vibration_rates);
-    if (table.kinds().size() > 1) {
-        VectorXd rates(3 * n);
-        for (Index k = 0; k < n; ++k)
-            rates.segment<3>(3 * k) = mapped(table.rows()[static_cast<std::size_t>(k)].rate);
-        out.flat = test_flatness(
-            table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.root),
-            prior, scattered);
-    }
+    const auto covariance = [&](const std::array<MatrixXd, 3>& gyros) {
+        return joint_covariance(table, gyros, out.vibration_rates, declared.root);
+    };
+    const VectorXd rates = uncertainty::all_rates(times);
+    out.fit = fit_groups(table, rates, covariance(noise), prior);
+    if (table.kinds().size() > 1)
+        out.flat = test_flatness(table, rates, covariance(if_flat), prior, scattered);
     for (std::size_t j = 0; j < 3; ++j) {
         problems[j].declared = of_gyro(declared.root, static_cast<Index>(j));
         settle(table, j, problems[j], form, out);

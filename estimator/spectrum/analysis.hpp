@@ -19,6 +19,7 @@ enum class Form { automatic, flat, groups, resonance };
 struct Analysis {
     Form form = Form::flat;  ///< what is in force
     Flatness flat;
+    GroupedFit fit;  ///< by noise and declared inputs alone, as if no bias had moved
     Groups groups;
     std::array<Mixture, 3> gyros;
     std::array<double, 3> lack_of_fit{1, 1, 1};  ///< p

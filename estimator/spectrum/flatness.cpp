@@ -34,9 +34,10 @@ MatrixXd interleaved(const std::array<MatrixXd, 3>& of) {
 /// Least squares of whitened columns with a prior about zero.
 class Fitted {
   public:
-    Fitted(MatrixXd white, const VectorXd& sigma) : white_(std::move(white)) {
+    Fitted(MatrixXd white, const VectorXd& sigma)
+        : white_(std::move(white)), prior_information_(sigma.array().square().inverse()) {
         MatrixXd normal = white_.transpose() * white_;
-        normal.diagonal().array() += sigma.array().square().inverse();
+        normal.diagonal() += prior_information_;
         factor_ = linear_algebra::Cholesky::or_nan(normal);
     }
     /// z' Q z of a whitened column.
@@ -47,14 +48,47 @@ class Fitted {
     [[nodiscard]] VectorXd value(const VectorXd& z) const {
         return factor_->solve(white_.transpose() * z);
     }
+    /// How large the coefficients are is no lack of fit (docs/theory/uncertainty.md).
+    [[nodiscard]] GroupedFit fit(const VectorXd& z) const {
+        const double determined = static_cast<double>(white_.cols()) -
+                                  factor_->inverse().diagonal().dot(prior_information_);
+        GroupedFit out;
+        out.chi_square = left(z) - value(z).cwiseAbs2().dot(prior_information_);
+        out.degrees = static_cast<int>(z.size() - std::lround(determined));
+        if (out.degrees > 0) out.p = uncertainty::chi_square_tail(out.chi_square, out.degrees);
+        return out;
+    }
+    /// Of whitened columns the one that takes most of z's chi-square away.
+    [[nodiscard]] std::size_t strongest(const MatrixXd& columns, const VectorXd& z) const {
+        const VectorXd rest = z - white_ * value(z);
+        const MatrixXd left = columns - white_ * factor_->solve(white_.transpose() * columns);
+        Index best = 0;
+        (columns.transpose() * rest)
+            .cwiseAbs2()
+            .cwiseQuotient(columns.cwiseProduct(left).colwise().sum().transpose())
+            .maxCoeff(&best);
+        return static_cast<std::size_t>(best);
+    }
 
   private:
     MatrixXd white_;
+    VectorXd prior_information_;
     std::optional<linear_algebra::Cholesky> factor_;
 };
 
 VectorXd stacked(const MatrixXd& per_gyro) {
     return Eigen::Map<const VectorXd>(per_gyro.data(), per_gyro.size());
+}
+
+/// The groups model, whitened by the covariance's root.
+Fitted grouped_fit(const SpectralTable& table, const linear_algebra::Cholesky& root,
+                   const MatrixXd& prior_sigma) {
+    std::array<MatrixXd, 3> groups;
+    for (std::size_t j = 0; j < 3; ++j) groups[j] = table.grouped(j);
+    MatrixXd prior(groups[0].cols(), 3);
+    for (Index j = 0; j < 3; ++j)
+        prior.col(j) = grouped_prior(prior_sigma.col(j), groups[0].cols());
+    return {root.whiten(interleaved(groups)), stacked(prior)};
 }
 
 /// Chi-square that a clean campaign exceeds with kAlarm.
@@ -128,20 +162,25 @@ VectorXd grouped_prior(const VectorXd& base, Index columns) {
     return out;
 }
 
+GroupedFit fit_groups(const SpectralTable& table, const VectorXd& rates, const MatrixXd& covariance,
+                      const MatrixXd& prior_sigma) {
+    const auto root = linear_algebra::Cholesky::or_nan(covariance);
+    const Fitted grouped = grouped_fit(table, root, prior_sigma);
+    const VectorXd y = root.whiten(rates);
+    GroupedFit out = grouped.fit(y);
+    if (out.p < kAlarm)
+        out.worst_rate = grouped.strongest(root.whiten(MatrixXd::Identity(y.size(), y.size())), y);
+    return out;
+}
+
 Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
                        const MatrixXd& covariance, const MatrixXd& prior_sigma, bool scattered) {
     const auto root = linear_algebra::Cholesky::or_nan(covariance);
     const auto whitened = [&](const MatrixXd& x) { return root.whiten(x); };
-    std::array<MatrixXd, 3> base, groups;
-    for (std::size_t j = 0; j < 3; ++j) {
-        base[j] = table.base(j);
-        groups[j] = table.grouped(j);
-    }
-    MatrixXd prior_groups(groups[0].cols(), 3);
-    for (Index j = 0; j < 3; ++j)
-        prior_groups.col(j) = grouped_prior(prior_sigma.col(j), groups[0].cols());
+    std::array<MatrixXd, 3> base;
+    for (std::size_t j = 0; j < 3; ++j) base[j] = table.base(j);
     const Fitted flat(whitened(interleaved(base)), stacked(prior_sigma));
-    const Fitted grouped(whitened(interleaved(groups)), stacked(prior_groups));
+    const Fitted grouped = grouped_fit(table, root, prior_sigma);
     const VectorXd y = whitened(rates);
     Flatness out;
     out.grouped_chi_square = grouped.left(y);
@@ -160,7 +199,7 @@ Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
     const double needed = noncentrality(out.degrees);
     // Of the lowest frequency: a flat fit of what is not flat has coefficients of no meaning.
     const VectorXd value = grouped.value(y);
-    const Index of_gyro = groups[0].cols();
+    const Index of_gyro = value.size() / 3;
     const auto share_seen = [&](double hz) {
         const VectorXd weights = table.elastic_weights({hz, kReportedDamping});
         VectorXd moved(rates.size());

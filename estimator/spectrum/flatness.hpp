@@ -48,6 +48,18 @@ struct Groups {
                                      const Eigen::MatrixXd& covariance,
                                      const Eigen::MatrixXd& prior_sigma, bool scattered);
 
+/// All rates about coefficients for every kind of vibration; `degrees`: less what is determined.
+struct GroupedFit {
+    double chi_square = 0;
+    int degrees = 0;
+    double p = 1;                ///< that it is by chance
+    std::size_t worst_rate = 0;  ///< where p is an alarm: element without which the others fit best
+};
+/// As in the test of flatness; `covariance` without a drift: one that is there is told by it.
+[[nodiscard]] GroupedFit fit_groups(const SpectralTable& table, const Eigen::VectorXd& rates,
+                                    const Eigen::MatrixXd& covariance,
+                                    const Eigen::MatrixXd& prior_sigma);
+
 /// Prior of the groups model: that of the base for every group.
 [[nodiscard]] Eigen::VectorXd grouped_prior(const Eigen::VectorXd& base, Eigen::Index columns);
 

@@ -78,11 +78,12 @@ std::vector<SurveyLine> survey_lines(const std::vector<double>& hz, double level
     for (const double asked : hz) {
         SurveyLine line;
         line.asked_hz = asked;
-        // Whole mHz, which a file and a register hold.
-        line.hz = std::round(1e3 * nearest_free(asked, sampling.sample_hz, sampling.window_s,
-                                                kHarmonicsPlanned)) /
-                  1e3;
         const std::string place = "--frequencies: found " + short_text(asked) + " Hz, expected ";
+        const auto free = nearest_free(asked, sampling.sample_hz, sampling.window_s);
+        if (!free)
+            throw PlanError(place + "another: " +
+                            nearest_free_words(asked, sampling.sample_hz, sampling.window_s));
+        line.hz = std::round(1e3 * *free) / 1e3;  // whole mHz, which a file and a register hold
         if (line.hz < mount.lowest_hz())
             throw PlanError(place + short_text(mount.lowest_hz()) +
                             " Hz at least: below it the isolators amplify");

@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kFewestDegrees = 9;
 constexpr double kUnlikely = 1e-3;
 constexpr double kNearBest = 3.0;  ///< of the logarithm of the odds
 constexpr double kMostWidening = 5.0;

@@ -7,6 +7,9 @@
 
 namespace vibrig::estimator::uncertainty {
 
+/// Fewer than so many degrees of freedom test nothing.
+inline constexpr int kFewestDegrees = 9;
+
 /// What the rules say of an assessment that is complete but for its verdict.
 [[nodiscard]] Verdict judge(const Settings& settings, const Result& result,
                             const Assessment& assessed, Stage stage);

@@ -15,8 +15,8 @@ void campaign_with(benchmark::State& state, const char* instruction_set) {
     estimator::use_instruction_set(instruction_set);
     const auto study = study::parse_study(
         "[study]\nname = 'a'\nkind = 'campaigns'\n[campaign]\ndwell_s = 100\n", "STUDY.toml");
-    const auto checked = study::check_campaigns(study, "STUDY.toml");
-    study::CampaignWorker worker(study, checked.sequences);
+    const auto sequences = study::check_campaigns(study, "STUDY.toml");
+    study::CampaignWorker worker(study, sequences);
     for (auto _ : state) benchmark::DoNotOptimize(worker.run(0));
 }
 void campaign(benchmark::State& state) {

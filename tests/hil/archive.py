@@ -136,6 +136,27 @@ def moves(checks, rig, lab, base):
     checks.equal(len(glob.glob(os.path.join(rig.folder, "trend", "*.svg"))), 31, "and draws a chart of each")
 
 
+def reported(checks, rig, lab):
+    """A report has the unit's earlier campaigns beside its own coefficients: those of its replay, though the recording has no result."""
+    def configured(folder):
+        with h5py.File(os.path.join(folder, "campaign.h5")) as file:
+            return file["configuration"][()]
+    campaign = next(path for path in glob.glob(os.path.join(rig.results, "unit-*")) if b'"0018"' in configured(path))
+    without = clone(campaign, os.path.join(rig.folder, "without-result"), 0)
+    with h5py.File(os.path.join(without, "campaign.h5"), "r+") as file:
+        del file["result"]
+    tables, page = [], os.path.join(rig.folder, "history.html")
+    for folder in (campaign, without):
+        run = lab.run("report", folder, "-o", page)
+        with open(page, encoding="utf-8") as file:
+            text = file.read()
+        history = text[text.index('id="history"'):] if 'id="history"' in text else ""
+        tables.append(history[:history.find("</table>")])
+    checks.check("Unit 0018: 12 earlier campaigns" in tables[0] and '<td>D_Fx</td><td class="bad">' in tables[0],
+                 "a report has the earlier campaigns, and marks what has moved", tables[0][:1000] + run.stderr)
+    checks.equal(tables[1], tables[0], "and the same of a recording without a result")
+
+
 def at_another_frequency(checks, rig, lab, base):
     """A campaign of that unit at another frequency, and an index of before it knew of which vibration a coefficient is."""
     def trend(*words):
@@ -628,6 +649,7 @@ def main():
         base = glob.glob(os.path.join(rig.results, "unit-*"))[0]
         small = clone(base, os.path.join(folder, "small"), 0)
         moves(checks, rig, lab, base)
+        reported(checks, rig, lab)
         at_another_frequency(checks, rig, lab, base)
         adaptive_by_type(checks, rig, lab, base, seed)
         rig.daemon.end()

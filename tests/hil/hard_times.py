@@ -70,7 +70,7 @@ class ForeignMaster:
 
 class FalseGuard:
     """Says for ever that it has stopped the shaker."""
-    WORD = struct.pack("<IHHQQd", 0x31476256, 0b11110, 3, 1, 7, 0.0)   # unarmed_motion, finding 7
+    WORD = struct.pack("<IHHQQd16s", 0x32476256, 0b11110, 3, 1, 7, 0.0, b"")   # unarmed_motion, finding 7
 
     def __init__(self, path):
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)

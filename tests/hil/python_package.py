@@ -229,6 +229,13 @@ printf(' %d', c.samples.quality(1, :), c.samples.quality(end, :));"""
     checks.equal(run.stdout, f"{joined.samples.rows} 1 {positions} {joined.samples['time_ns'][-1]} {quality}",
                  "Octave joins parts as Python does, of more and fewer channels, too")
     checks.equal(quality, "0 1 2 3 4 0 5 0 1 2 3 4 0 1", "and a channel that a part lacks is unbound in it")
+    with h5py.File(path, "r+") as file:
+        file["ended"] = np.bytes_(json.dumps({"state": "continued", "reason": "", "mark": "", "ended_utc_ns": "0"}))
+    run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval",
+                          f"addpath('{MATLAB}'); try, vibrig.open('{made.folder}'); catch e, printf('%s', e.message); end"],
+                         capture_output=True, text=True, timeout=60)
+    checks.equal(run.stdout, f"{made.folder}: missing campaign-4.h5, in which campaign-3.h5 says that the campaign goes on",
+                 "and names a last part that is missing")
     checks.note(run.stderr[-500:])
 
 
@@ -371,6 +378,11 @@ def certificate_of_lies(checks, rig, campaign, paper):
         run = tool(rig, "replay", away)
         checks.check(run.returncode == 1 and "the recording's result is not that of its dwells (/result: " in run.stderr and
                      "last bit" not in run.stderr, f"and a replay says so of {what}", run.stderr)
+        run = tool(rig, "report", away, "-o", "lied.html")
+        with open(os.path.join(rig.folder, "lied.html"), encoding="utf-8") as file:
+            page = file.read()
+        checks.check("result is not that of its dwells (/result: " in run.stderr and "result is not that of its dwells: /result: " in page and
+                     "last bit" not in page, f"and so does a report of {what}", run.stderr)
     lied("one digit of a coefficient", None)
     honest = campaign.result
     for what, change in (("u / 10", lambda r: r["parameters"][3].update(u=honest["parameters"][3]["u"] / 10)),
@@ -444,6 +456,15 @@ def check_contradiction(checks, programs, folder):
         if command[0] == "compensate":
             checks.check("not valid" in run.stdout and "verdict: not valid" in run.stderr, f"and what compensates says so itself: {command[-1]}",
                          run.stdout[:1500])
+    study = os.path.join(folder, "again")
+    with open(study + ".toml", "w", encoding="utf-8") as file:
+        file.write(f'[study]\nname = "again"\nkind = "recordings"\nfolders = ["{recording}"]\n')
+    for command in (("plan", study + ".toml", "-o", study), ("run", study), ("merge", study, "-o", study + ".json")):
+        run = tool(rig, "study", *command)
+        checks.check(run.returncode == 0, f"of the recording a study: {command[0]}", run.stderr)
+    with open(study + ".json", encoding="utf-8") as file:
+        again = json.load(file)["recordings"][0]
+    checks.equal((again["old"]["verdict"], again["new"]["verdict"]), ("not valid", "not valid"), "a study of recordings says so, too")
 
 
 def main():

@@ -319,6 +319,7 @@ def complete(checks, rig):
         file.write("[noise]\nresolver_arcsec = 10.0\n")
     anew = offline(rig, "replay", path, "--config", other, "--json")
     checks.check(json.loads(anew.stdout)["nis"] < json.loads(result)["nis"], "other settings give another result")
+    doubted(checks, rig, path)
     studied(checks, rig, folder, json.loads(anew.stdout))
     changed(checks, rig, path)
     changed_numbers(checks, rig, path)
@@ -327,6 +328,24 @@ def complete(checks, rig):
     wrong_input(checks, rig, path)
     kept(checks, rig, folder)
     report(checks, rig, folder)
+
+
+def doubted(checks, rig, path):
+    """A setting that is permitted but hardly meant is a warning, whatever is made of the campaign."""
+    settings, page = (os.path.join(rig.folder, name) for name in ("vertical.toml", "vertical.html"))
+    with open(settings, "w", encoding="utf-8") as file:
+        file.write('[platform]\nsecond_moment = "vertical"\n')
+    words = 'platform.second_moment: found "vertical" without'
+    for command in (("identify",), ("replay",), ("compensate",), ("compensate", "--to", "csv")):
+        for config, expected in ((("--config", settings), True), ((), False)):
+            run = offline(rig, command[0], path, *command[1:], *config)
+            checks.check(("warning: " + words in run.stdout) == expected, f"{' '.join(command)}: {words}: {expected}", run.stdout + run.stderr)
+    for command in ("identify", "replay", "compensate"):
+        said = json.loads(offline(rig, command, path, "--config", settings, "--json").stdout)["warnings"]
+        checks.check(any(words in one for one in said), f"{command} --json: {words}", str(said))
+    offline(rig, "report", path, "--config", settings, "-o", page)
+    with open(page, encoding="utf-8") as file:
+        checks.check("Warning: platform.second_moment: found" in file.read(), "the report's page says so")
 
 
 def studied(checks, rig, folder, anew):

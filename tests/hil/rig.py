@@ -161,11 +161,11 @@ class Rig:
         self.results = os.path.join(folder, "results")
         self.configuration = os.path.join(folder, "vibrigd.toml")
         self.control = os.path.join(folder, "control")
-        self.plant = self.daemon = None
+        self.plant = self.daemon = self.tools = None
         os.makedirs(self.results, exist_ok=True)
 
     def program(self, name):
-        return os.path.join(self.programs, name)
+        return os.path.join(self.tools if self.tools and name == "vibrig" else self.programs, name)
 
     def configure(self, campaign, **tables):
         can = {"port": "seqpacket", "path": self.path} if self.bus == "seqpacket" else {"interface": self.bus}

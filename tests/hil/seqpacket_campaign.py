@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Campaigns over the seqpacket bus on the rig's clock, with programs built under a sanitizer.
 
-usage: seqpacket_campaign.py PROGRAMS
+usage: seqpacket_campaign.py PROGRAMS [--tool FOLDER]      where vibrig is, if not there
 """
 import json
 import os
@@ -58,6 +58,8 @@ def end_without_rig(checks, programs, folder):
 
 
 def start(rig, **other):
+    if "--tool" in sys.argv:
+        rig.tools = os.path.realpath(sys.argv[sys.argv.index("--tool") + 1])
     rig.start_plant("--seed", "3", "--truth", rig.truth_file(r.QUICK))
     rig.configure({**SHORT, **other})
     rig.start_daemon()

@@ -10,6 +10,7 @@
 
 #include "proto/command_tree.hpp"
 #include "proto/dbc.hpp"
+#include "proto/empty_element.hpp"
 #include "proto/empty_value.hpp"
 #include "proto/named_files.hpp"
 #include "proto/text.hpp"
@@ -55,6 +56,7 @@ int main(int argc, char** argv) {
         if (!word.starts_with("-") && std::ranges::none_of(app.get_subcommands({}), is_it))
             throw std::runtime_error("found \"" + vibrig::proto::printable(word) +
                                      "\", expected a command; vibrig-plant --help lists them");
+        vibrig::proto::refuse_empty_elements(app, arguments);
         std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
         app.parse(arguments);
     } catch (const CLI::ParseError& error) {

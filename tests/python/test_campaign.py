@@ -1,6 +1,8 @@
 """vibrig.open on recordings, good and bad."""
+import hashlib
 import pathlib
 import re
+import shutil
 
 import h5py
 import numpy as np
@@ -148,6 +150,18 @@ def test_what_both_files_have_is_there_once(recording):
     assert list(joined.orders["position"]) == [1, 2, 3] and list(joined.dwells["position"]) == [1, 2, 3]
 
 
+def test_a_last_part_that_is_missing_is_named(recording, tmp_path):
+    recording.part(1, 10 * SECOND, [1], 1, state="continued")
+    last = recording.part(2, 10 * SECOND + 400 * STEP, [2], 1, state="continued")
+    for path in (recording.folder, last):
+        with pytest.raises(vibrig.FormatError, match=r"campaign-2.h5: attribute state: found continued, expected campaign-3.h5 beside it"):
+            vibrig.open(path)
+    # A file of another name stands for itself.
+    assert vibrig.open(shutil.copy(last, tmp_path / "alone.h5")).state == "continued"
+    recording.part(3, 10 * SECOND + 800 * STEP, [3], 1)
+    assert vibrig.open(recording.folder).state == "finished"
+
+
 def test_older_recordings_have_no_conditions(recording):
     recording.part(1, 0, [1], 1, conditions=False)
     conditions = vibrig.open(recording.folder).conditions
@@ -185,6 +199,20 @@ def test_attributes_that_lie_are_refused(recording, change, words):
     with h5py.File(path, "r+") as file:
         change(file)
     with pytest.raises(vibrig.FormatError, match=words):
+        vibrig.open(path)
+
+
+def test_a_configuration_that_was_changed_since_is_refused(recording):
+    path = recording.part(1, 0, [1], 1)
+    with h5py.File(path, "r+") as file:
+        text = file["configuration"][()]
+        file.attrs["configuration_sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())
+    assert vibrig.open(path).configuration_text == text.decode()
+    with h5py.File(path, "r+") as file:
+        del file["configuration"]
+        file["configuration"] = np.bytes_(text.replace(b"0.6667", b"0.6668"))
+    with pytest.raises(vibrig.FormatError, match="campaign.h5: /configuration: found SHA-256 [0-9a-f]{64}, expected [0-9a-f]{64} of "
+                                                 "attribute configuration_sha256"):
         vibrig.open(path)
 
 

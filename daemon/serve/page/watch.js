@@ -63,7 +63,7 @@ const Watch = (() => {
 
   // Who watches from outside, and what makes itself heard.
   const guard = g => (!g.heard ? ['bad', 'GUARD NOT HEARD: ' + g.note] : g.text ? ['bad', 'guard: ' + g.text]
-    : !g.sees ? ['bad', 'guard sees no accelerometer'] : !g.reaches_shaker ? ['bad', 'guard does not reach the shaker'] : ['', 'guard watches']);
+    : !g.sees ? ['bad', 'guard sees no accelerometer'] : !g.reaches_shaker ? ['bad', 'guard does not reach the shaker'] : g.note ? ['warn', 'guard watches, ' + g.note] : ['', 'guard watches']);
   const horn = a => [
     ...(a.horn ? [a.confirms ? [a.pattern && a.pattern !== 'none' ? 'warn' : '', a.pattern && a.pattern !== 'none' ? 'horn sounds: ' + a.pattern : 'horn ready'] : ['bad', 'HORN: ' + a.horn_note]] : []),
     ...(a.command ? [a.command_note ? ['warn', 'pager: ' + a.command_note] : ['', 'pager ready']] : [])];

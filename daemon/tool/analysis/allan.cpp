@@ -7,7 +7,6 @@
 #include "daemon/allan/analysis.hpp"
 #include "daemon/tool/analysis/allan_live.hpp"
 #include "daemon/tool/commands.hpp"
-#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -27,21 +26,6 @@ struct Options {
     bool json = false;
     bool live = false;
 };
-
-/// A number within [low, high]. CLI11's own checks let nan through.
-CLI::Validator number_in(double low, double high, const std::string& expected) {
-    return CLI::Validator(
-        [low, high, expected](std::string& text) {
-            double value = 0;
-            const bool good = proto::read_number(text, value) && value >= low && value <= high;
-            return good ? std::string() : "found \"" + text + "\", expected " + expected;
-        },
-        "");
-}
-
-CLI::Validator seconds() {
-    return number_in(kShortestStep, kLongestStep, "seconds from 1e-9 to 1e9");
-}
 
 int run(const Options& options) {
     AllanRequest request = options.request;
@@ -90,12 +74,10 @@ int run(const Options& options) {
 void add_dynamic_options(CLI::App& command, Options& options) {
     AllanRequest& request = options.request;
     CLI::Option* const dynamic =
-        command
-            .add_option("--dynamic", request.window_s, "windows of W s: surface, traces, alarms")
-            ->type_name("W")
-            ->check(seconds());
-    command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)")
-        ->check(number_in(0, 0.9999, "a number from 0 to 0.9999"));
+        add_number(command, "--dynamic", request.window_s,
+                   "windows of W s: surface, traces, alarms", kShortestStep, kLongestStep)
+            ->type_name("W");
+    add_number(command, "--overlap", request.overlap, "of neighbouring windows (0.5)", 0, 0.9999);
     command
         .add_option("--shape", options.shape,
                     "weights within a window: rectangular (default), hann, exponential")
@@ -108,19 +90,14 @@ void add_dynamic_options(CLI::App& command, Options& options) {
                     "paper's way, biased)")
         ->check(CLI::IsMember({"corrected", "known-mean", "window-mean"}));
     options.known_mean =
-        command
-            .add_option("--known-mean", request.known_mean,
-                        "mean rate in deg/h for --mean known-mean")
-            ->check(number_in(-kLargestValue, kLargestValue, "a mean rate in deg/h"));
-    command.add_option("--alpha", request.alpha, "level of the alarms of one window (0.001)")
-        ->check(number_in(1e-12, 0.5, "a probability from 1e-12 to 0.5"));
-    command
-        .add_option("--reference", options.reference,
-                    "accepted Q,N,B,K,R (arcsec, deg/rt-h, deg/h, deg/h^1.5, deg/h^2); without it "
-                    "the first five windows teach")
-        ->expected(static_cast<int>(allan::kTerms))
-        ->delimiter(',')
-        ->check(number_in(0, kLargestValue, "Q,N,B,K,R, each zero or above"));
+        add_number(command, "--known-mean", request.known_mean,
+                   "mean rate in deg/h for --mean known-mean", -kLargestValue, kLargestValue);
+    add_number(command, "--alpha", request.alpha, "level of the alarms of one window (0.001)",
+               1e-12, 0.5);
+    add_numbers(command, "--reference", options.reference, static_cast<int>(allan::kTerms),
+                "accepted Q,N,B,K,R (arcsec, deg/rt-h, deg/h, deg/h^1.5, deg/h^2); without it "
+                "the first five windows teach",
+                0, kLargestValue);
     for (const char* of_windows : {"--overlap", "--shape", "--mean", "--alpha", "--reference"})
         command.get_option(of_windows)->needs(dynamic);
 }
@@ -135,9 +112,9 @@ void add_allan(CLI::App& app, int& exit_code) {
         .add_option("FILE", request.file,
                     "numbers, one a line, or CSV; plain or gzip; - is standard input")
         ->required();
-    command.add_option("--tau0", request.tau0, "s between samples; or give --time")
-        ->type_name("S")
-        ->check(seconds());
+    add_number(command, "--tau0", request.tau0, "s between samples; or give --time", kShortestStep,
+               kLongestStep)
+        ->type_name("S");
     command.add_option("--column", request.column, "name or number (from 1) of the column");
     command.add_option("--time", request.time, "column with time stamps in s");
     command.add_option("--data", options.data, "rate (default) or phase")
@@ -147,8 +124,8 @@ void add_allan(CLI::App& app, int& exit_code) {
     command.add_option("--type", options.type,
                        "adev, oadev (default), mdev, hdev, ohdev, tdev, totdev");
     command.add_option("--taus", request.taus, "octave (default), decade, all, or s: 1,10,100");
-    command.add_option("--confidence", request.confidence, "of the intervals (0.683)")
-        ->check(number_in(0.01, 0.9999, "a number from 0.01 to 0.9999"));
+    add_number(command, "--confidence", request.confidence, "of the intervals (0.683)", 0.01,
+               0.9999);
     command.add_flag("--fit", request.fit, "Q, N, B, K, R with errors");
     command.add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
     add_dynamic_options(command, options);

@@ -74,8 +74,9 @@ void add_design_options(CLI::App& command, Options& o) {
     add_number(command, "--settling", o.specification.settling_s, "settling time in s (100)",
                kAboveZero, 1e7);
     auto* residual = add_number(command, "--residual", o.specification.residual,
-                                "fraction of the initial tilt left then (0.005)");
-    auto* damping = add_number(command, "--damping", o.specification.damping, "ratio xi (0.7)");
+                                "fraction of the initial tilt left then (0.005)", kAboveZero, 0.99);
+    auto* damping = add_number(command, "--damping", o.specification.damping, "ratio xi (0.7)",
+                               kAboveZero, 0.999);
     add_numbers(command, "--gains", o.gains, 3, "K1,K2,K3 instead of a design")
         ->excludes(residual)
         ->excludes(damping);

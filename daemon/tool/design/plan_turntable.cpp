@@ -1,7 +1,6 @@
 #include "daemon/tool/design/plan_turntable.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <stdexcept>
@@ -42,11 +41,10 @@ planning::Counts allocated(const std::string& allocation) {
 
 void check(const TurntableRequest& request) {
     const auto& spheres = request.spheres;
-    for (std::size_t i = 0; i < spheres.size(); ++i) {
-        if (!(spheres[i] > 0) || !std::isfinite(spheres[i]) ||
-            (i > 0 && spheres[i] <= spheres[i - 1]))
+    for (std::size_t i = 1; i < spheres.size(); ++i) {
+        if (spheres[i] <= spheres[i - 1])
             throw std::runtime_error("--spheres: found " + printed("%g", spheres[i]) +
-                                     ", expected growing radii above 0");
+                                     ", expected growing radii");
     }
     if (request.allocation != "free" && spheres.size() != 2) {
         throw std::runtime_error("--allocation: found " + request.allocation + " with " +

@@ -78,7 +78,8 @@ int show_status(const StatusOptions& options) {
     serve::Client client(options.at);
     if (options.json) {
         const serve::Reply reply = client.get("/api/v1/status");
-        if (reply.status != 200) throw serve::ClientError(problem_of(reply));
+        v1::Status status;
+        parse_answer(reply, status);
         std::cout << reply.body << '\n';
         return 0;
     }
@@ -344,9 +345,13 @@ std::string default_socket() {
 
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
     if (reply.status != 200) throw serve::ClientError("vibrigd: " + problem_of(reply));
-    if (const auto found = parsed(reply.body, message); !found.ok())
-        throw serve::ClientError("the daemon's answer is not as expected: " +
-                                 std::string(found.message()));
+    const auto found = parsed(reply.body, message);
+    if (found.ok()) return;
+    // Below its first line protobuf draws the place.
+    const std::string why(found.message());
+    throw serve::ClientError("the daemon's answer: found '" + proto::printable(reply.body) +
+                             "', expected JSON of " + message.GetTypeName() + ": " +
+                             proto::printable(why.substr(0, why.find('\n')), kLongestLine));
 }
 
 v1::Status ask_status(serve::Client& client) {

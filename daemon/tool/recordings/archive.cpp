@@ -136,7 +136,7 @@ int add(const AddOptions& o) {
                     std::cout << proto::json_text(
                                      Json{{"folder", folder}, {"refused", error.what()}})
                               << std::endl;
-                if (found.size() == 1) throw;
+                if (found.size() == 1 && o.folders.size() == 1) throw;
                 std::cerr << error.what() << '\n';
                 code = kNo;
             }

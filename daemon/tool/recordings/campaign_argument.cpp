@@ -23,9 +23,9 @@ std::string named_campaign(const std::string& argument) {
 record::Campaign read_named_campaign(const std::string& argument) {
     const std::string path = record::campaign_path(named_campaign(argument));
     // A file of another name, put aside by somebody, is none of the index.
-    const auto parts = record::part_files(record::folder_of(path));
-    for (const auto& [number, file] : parts) {
-        if (file == path) record::compare_with_index(record::folder_of(path), tell_on_error);
+    for (const auto& [number, file] : record::part_files(record::folder_of(path))) {
+        if (record::is_part_file(path, number))
+            record::compare_with_index(record::folder_of(path), tell_on_error);
     }
     return record::read_campaign(path);
 }

@@ -22,11 +22,10 @@
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/analysis/seen_plan.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
+#include "daemon/tool/analysis/stated_lines.hpp"
 #include "daemon/tool/analysis/swept_dwells.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/replayed_result.hpp"
-#include "estimator/commissioning/contradiction.hpp"
-#include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/spectrum/sampling.hpp"
@@ -50,18 +49,6 @@ struct Found {
     std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
     estimator::spectrum::Shaken shaken;
 };
-
-/// What is unusual of the configuration, and what of the recording contradicts it.
-void tell_doubts(const estimator::Settings& settings,
-                 const estimator::Identification& identification, Found& found) {
-    auto& warnings = found.result.warnings;
-    for (const auto& doubt : estimator::doubtful_keys(settings))
-        warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " + doubt.expected);
-    const auto contradiction = estimator::commissioning::contradiction_of(
-        settings, found.result.dwells, identification.means());
-    warnings.insert(warnings.end(), contradiction.warnings.begin(), contradiction.warnings.end());
-    found.contradiction = contradiction.first;
-}
 
 /// What the filter need not be asked for, of rows in their order: where a dwell begins, and what a
 /// plan would have said of it.
@@ -127,7 +114,7 @@ class RowsIdentified {
         Found found;
         found.result = identification_.result();
         for (auto& row : found.result.rows) row.common_clock = seen.common_clock();
-        tell_doubts(settings_, identification_, found);
+        found.contradiction = tell_doubts(settings_, identification_.means(), found.result);
         for (const estimator::DwellRow& row : identification_.rows())
             if (row.held_out) found.kept_out.push_back({row, {}});
         return found;
@@ -284,9 +271,9 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
         throw std::runtime_error(
             file +
             printed(": %s: found %g Hz at %g samples/s, of which a harmonic falls on a multiple of "
-                    "the rate, expected another: the nearest is %g Hz",
+                    "the rate, expected another: %s",
                     spectra ? "--spectra" : "column frequency_hz", hz, 1 / period_s,
-                    spectrum::nearest_free(hz, 1 / period_s, window_s)));
+                    spectrum::nearest_free_words(hz, 1 / period_s, window_s).c_str()));
     }
 }
 
@@ -341,7 +328,7 @@ class DwellsIdentified {
         if (!held_out) plan_.tell();
         found_.kinds = kinds_.kinds();
         found_.result = identification_.result();
-        tell_doubts(settings_, identification_, found_);
+        found_.contradiction = tell_doubts(settings_, identification_.means(), found_.result);
         return std::move(found_);
     }
 
@@ -382,11 +369,20 @@ class DwellsIdentified {
                               ", with which it is said to have shaken");
             resting_.push_back(d);
         }
+        if (shook && !is_random(d) && kinds_.kinds()[*kind].bands.size() > 1)
+            expect_lines(d, kinds_.kinds()[*kind].bands);
         if (row.held_out)
             found_.kept_out.push_back(
                 {row, shook ? kinds_.kinds()[*kind] : estimator::spectrum::Kind{}});
         else
             found_.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
+    }
+    void expect_lines(std::size_t d, const std::vector<estimator::spectrum::Band>& lines) const {
+        const auto against =
+            against_lines(dwells_[d].rows, lines, settings_.accelerometer_response);
+        if (!against.empty())
+            refuse(d,
+                   printed("run %d, position %d: ", dwells_[d].run, dwells_[d].position) + against);
     }
     [[noreturn]] void refuse(std::size_t d, const std::string& what) const {
         throw std::runtime_error(file_ + ":" + std::to_string(dwells_[d].rows.front()->line) +
@@ -464,7 +460,7 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     Found found;
     found.result = anew ? anew->result() : identification.result();
     record::qualify(campaign, dwells.size(), found.result);
-    tell_doubts(settings, identification, found);
+    found.contradiction = tell_doubts(settings, identification.means(), found.result);
     found.rows = identification.rows();
     return found;
 }

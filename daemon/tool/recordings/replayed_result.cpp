@@ -8,6 +8,7 @@
 #include "daemon/report/paperwork.hpp"
 #include "daemon/results/result_difference.hpp"
 #include "estimator/commissioning/contradiction.hpp"
+#include "estimator/filter/settings_check.hpp"
 #include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::tool {
@@ -36,14 +37,21 @@ std::string not_as_recorded(const record::Campaign& campaign, const record::Repl
                              replayed_json(campaign, replayed, found, settings));
 }
 
+std::string tell_doubts(const estimator::Settings& settings,
+                        const std::vector<estimator::DwellMeans>& means,
+                        estimator::Result& result) {
+    auto& warnings = result.warnings;
+    for (const auto& doubt : estimator::doubtful_keys(settings)) warnings.push_back(doubt.words());
+    const auto found = estimator::commissioning::contradiction_of(settings, result.dwells, means);
+    warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
+    return found.first;
+}
+
 std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,
                            estimator::uncertainty::Verdict& verdict) {
-    const auto found = estimator::commissioning::contradiction_of(settings, replayed.result.dwells,
-                                                                  replayed.means);
-    auto& warnings = replayed.result.warnings;
-    warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
-    estimator::uncertainty::contradict(verdict, found.first);
-    return found.first;
+    const std::string contradiction = tell_doubts(settings, replayed.means, replayed.result);
+    estimator::uncertainty::contradict(verdict, contradiction);
+    return contradiction;
 }
 
 }  // namespace vibrig::tool

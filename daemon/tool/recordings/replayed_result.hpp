@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "daemon/record/replay.hpp"
 #include "daemon/results/result_json.hpp"
@@ -23,8 +24,12 @@ namespace vibrig::tool {
                                           const Assessed& found,
                                           const estimator::Settings& settings);
 
-/// As the daemon at a campaign's end: where the recording contradicts the configuration, the
-/// result has warnings of it and the verdict is no. The contradiction; empty: none.
+/// Warnings of the result: what is unusual of the configuration, and where the recording
+/// contradicts it. The first contradiction; empty: none.
+std::string tell_doubts(const estimator::Settings& settings,
+                        const std::vector<estimator::DwellMeans>& means, estimator::Result& result);
+
+/// The same, as the daemon at a campaign's end: where they contradict the verdict is no.
 std::string doubt_replayed(const estimator::Settings& settings, record::ReplayResult& replayed,
                            estimator::uncertainty::Verdict& verdict);
 

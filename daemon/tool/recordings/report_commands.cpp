@@ -54,7 +54,7 @@ struct ReportArguments {
 
 struct CompensateArguments {
     std::string campaign, format = "text", output, config;
-    std::optional<std::string> platform_g, table_g;  ///< as given
+    std::optional<double> platform_g, table_g;  ///< peak acceleration
     std::vector<double> attitude{0, 0, 0};
 };
 
@@ -63,9 +63,24 @@ configuration::Configuration rig_of(const record::Campaign& campaign, const std:
                           : configuration::load(config, false).configuration;
 }
 
-/// This campaign's coefficients beside those of the unit's earlier ones in an archive.
-void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
-                 report::Analysis& analysis) {
+/// What the recording's own settings give, as the daemon writes it. Where the recorded result is
+/// another, the page and standard error say so.
+std::string own_result(const record::Campaign& campaign, report::Analysis& analysis) {
+    const auto settings = report::configuration_of(campaign).estimator;
+    const Assessed found{analysis.assessed, analysis.spectrum};
+    // Where the dwells differ it is another anyway.
+    if (analysis.replayed.as_recorded())
+        analysis.not_as_recorded = not_as_recorded(campaign, analysis.replayed, found, settings);
+    if (!analysis.not_as_recorded.empty())
+        std::cerr << "the recording's result is not that of its dwells ("
+                  << analysis.not_as_recorded << ")\n";
+    return replayed_json(campaign, analysis.replayed, found, settings);
+}
+
+/// This campaign's coefficients, of that result, beside those of the unit's earlier ones in an
+/// archive.
+void add_history(const record::Campaign& campaign, const std::string& result,
+                 const ArchiveOptions& where, report::Analysis& analysis) {
     const std::string serial = report::paperwork_of(campaign).unit_serial;
     if (serial.empty() || !whereabouts_of(where).named) return;
     archive::Filter filter;
@@ -78,8 +93,7 @@ void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
     now.simulated = campaign.head.simulated;
     now.started_utc_ns = campaign.head.utc_ns;
     now.rig = before.empty() ? "" : before.back().rig;
-    archive::take_result(campaign.result_json,
-                         report::configuration_of(campaign).estimator.frequency_hz, now);
+    archive::take_result(result, report::configuration_of(campaign).estimator.frequency_hz, now);
     const auto moved = archive::moved(now, before);
     const auto trend =
         archive::trend_of(before, archive::kShutdownAfterH, now.simulated, now.coefficients);
@@ -125,8 +139,11 @@ int make_report(const ReportArguments& arguments) {
     }
     doubt_replayed(rig.estimator, analysis.replayed, analysis.assessed.verdict);
     analysis.anew_with = proto::printable(arguments.config, proto::kLongestLine);
+    // Beside other settings the history stays that of the recorded ones.
+    const std::string result =
+        arguments.config.empty() ? own_result(campaign, analysis) : campaign.result_json;
     try {
-        add_history(campaign, arguments.archive, analysis);
+        add_history(campaign, result, arguments.archive, analysis);
     } catch (const std::exception& error) {
         // The report is of this campaign: an archive that is gone does not keep it.
         analysis.history_note = std::string("The archive could not be asked: ") + error.what();
@@ -180,7 +197,7 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
 std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
                               const estimator::Settings& settings, const std::string& frequencies,
                               const std::string& anew_with, const Json& verdict,
-                              const Json& prediction) {
+                              const std::vector<std::string>& warnings, const Json& prediction) {
     Json root;
     root["simulated"] = campaign.head.simulated;
     if (campaign.head.simulated) root["note"] = kSimulatedRig;
@@ -189,6 +206,7 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
     root["file"] = campaign.path;
     root["identified_anew_with"] = text_or_null(anew_with);
     root["verdict"] = verdict;
+    root["warnings"] = warnings;
     root["model"] =
         "D = F + I aI + O aO + S aS + II aI^2 + OO aO^2 + SS aS^2 + IO aI aO + IS aI aS "
         "+ OS aO aS; a: specific force along input, output, spin axis, g";
@@ -227,6 +245,7 @@ std::string axes_line(const estimator::Settings& settings) {
 /// What the coefficients rest on, and whether they can be believed.
 std::vector<std::string> notes_of(const CompensateArguments& arguments,
                                   const estimator::uncertainty::Verdict& verdict,
+                                  const std::vector<std::string>& warnings,
                                   const std::string& frequencies) {
     std::vector<std::string> notes;
     if (!arguments.config.empty())
@@ -234,6 +253,7 @@ std::vector<std::string> notes_of(const CompensateArguments& arguments,
                         proto::printable(arguments.config, proto::kLongestLine) +
                         ", not as recorded");
     notes.push_back("verdict: " + verdict.sentence);
+    for (const std::string& warning : warnings) notes.push_back("warning: " + warning);
     if (!frequencies.empty()) notes.push_back(frequencies);
     return notes;
 }
@@ -335,15 +355,6 @@ std::string coefficients_text(const report::Coefficients& c, const std::string& 
     return text;
 }
 
-/// Peak acceleration of an option, g.
-double level_of(const char* option, const std::string& text) {
-    double level = 0;
-    if (!proto::read_number(std::string_view(text), level) || !(level >= 0) || !(level <= 1000))
-        throw std::runtime_error(std::string(option) + ": found '" + proto::printable(text) +
-                                 "', expected 0 to 1000 g");
-    return level;
-}
-
 /// What the quadratic coefficients are of; empty: there is one frequency. Throws where they say
 /// nothing of the drift under vibration.
 std::string about_frequencies(const std::string& path, const Assessed& of, double level_g) {
@@ -377,16 +388,7 @@ void check_finite(const std::string& path, const report::Coefficients& c) {
 }
 
 int compensate(const CompensateArguments& arguments) {
-    if (arguments.platform_g && arguments.table_g)
-        throw std::runtime_error("--table-g: found it beside --platform-g, expected one of them");
-    for (const double angle : arguments.attitude) {
-        if (!std::isfinite(angle) || std::abs(angle) > 360)
-            throw std::runtime_error("--attitude: found " + printed("%g", angle) +
-                                     ", expected -360 to 360 deg");
-    }
-    double level = 0;
-    if (arguments.platform_g) level = level_of("--platform-g", *arguments.platform_g);
-    if (arguments.table_g) level = level_of("--table-g", *arguments.table_g);
+    double level = arguments.table_g.value_or(arguments.platform_g.value_or(0));
     proto::check_output(arguments.output);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
@@ -412,7 +414,7 @@ int compensate(const CompensateArguments& arguments) {
             campaign.path +
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
-    const auto notes = notes_of(arguments, verdict, frequencies);
+    const auto notes = notes_of(arguments, verdict, replayed.result.warnings, frequencies);
     auto comments =
         comment_lines(notes, settings, coefficients.combined, predicted, arguments, kappa);
     const bool simulated = campaign.head.simulated;
@@ -422,6 +424,7 @@ int compensate(const CompensateArguments& arguments) {
         arguments.format == "json"
             ? coefficients_json(campaign, coefficients, settings, frequencies, arguments.config,
                                 assessment_json(found.assessed)["verdict"],
+                                replayed.result.warnings,
                                 prediction_json(predicted, arguments, kappa))
         : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
         : arguments.format == "c"
@@ -480,17 +483,15 @@ void add_reports(CLI::App& app, int& exit_code) {
         "--json", [&format = compensation.format] { format = "json"; }, "as --to json");
     compensating.add_option("-o,--output", compensation.output,
                             "file to write (default: standard output)");
-    compensating
-        .add_option(
-            "--attitude", compensation.attitude,
-            "outer, inner, azimuth of the gimbals (no encoder readings) in deg at which the "
-            "drift is predicted (default 0,0,0)")
-        ->delimiter(',')
-        ->expected(3);
-    // As text: CLI11 takes an empty one for 0.
-    compensating.add_option("--platform-g", compensation.platform_g,
-                            "vibration, peak at the platform, g (default 0)");
-    compensating.add_option("--table-g", compensation.table_g, "or peak at the table, g");
+    add_numbers(compensating, "--attitude", compensation.attitude, 3,
+                "outer, inner, azimuth of the gimbals (no encoder readings) in deg at which the "
+                "drift is predicted (default 0,0,0)",
+                -360, 360);
+    CLI::Option* const platform =
+        add_number(compensating, "--platform-g", compensation.platform_g,
+                   "vibration, peak at the platform, g (default 0)", 0, 1000);
+    add_number(compensating, "--table-g", compensation.table_g, "or peak at the table, g", 0, 1000)
+        ->excludes(platform);
     compensating.add_option("--config", compensation.config,
                             "identify anew with these settings instead of the recorded ones");
     compensating.footer(

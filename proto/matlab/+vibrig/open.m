@@ -20,6 +20,7 @@ campaign = vibrig.internal.read_part(parts{1});
 for i = 2:numel(parts)
   campaign = vibrig.internal.join_parts(campaign, vibrig.internal.read_part(parts{i}), i);
 end
+refuse_missing_end(parts, campaign.state);
 campaign.parts = parts;
 campaign.coefficients = coefficients_of(campaign);
 campaign.verdict = [];
@@ -50,6 +51,16 @@ if ~isempty(missing)
   error('vibrig:missing', '%s: missing part %d, expected all %d parts', path, missing(1), max(numbers));
 end
 parts = arrayfun(@(number) fullfile(folder, part_name(number)), numbers, 'UniformOutput', false);
+end
+
+function refuse_missing_end(parts, state)
+% A part is called continued once the next file is there, which may have come since the files were looked for.
+[folder, name, ending] = fileparts(parts{end});
+count = numel(parts);
+if ~strcmp(state, 'continued') || ~strcmp([name ending], part_name(count)), return, end
+if ~exist(fullfile(folder, part_name(count + 1)), 'file')
+  error('vibrig:missing', '%s: missing %s, in which %s says that the campaign goes on', folder, part_name(count + 1), part_name(count));
+end
 end
 
 function name = part_name(number)

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import re
@@ -21,6 +22,8 @@ except ImportError:  # before Python 3.11
     tomllib = None  # type: ignore[assignment]
 
 FORMAT_VERSION = 2
+CONTINUED = "continued"  # the state of a part behind which there is another
+DIGEST = "configuration_sha256"
 UNWRITTEN = np.iinfo(np.int64).min  # a row that never reached the disk
 SECOND = 10**9
 PIECE = 2**20  # rows looked at in one go
@@ -366,13 +369,29 @@ def _columns(file: h5py.File, table: str, path: Path) -> dict[str, h5py.Dataset]
     return columns
 
 
-def _long_text(file: h5py.File, name: str, path: Path) -> str:
+def _long_bytes(file: h5py.File, name: str, path: Path) -> bytes:
     if file.get(name, getlink=True) is None:
-        return ""
+        return b""
     found = _dataset(file, name, path)
     if found.ndim > 0 or found.dtype.kind not in "SO":
         raise FormatError(f"{path}: /{name}: found no text, expected one")
-    return _text(found[()])
+    value = found[()]
+    return value if isinstance(value, bytes) else str(value).encode()
+
+
+def _long_text(file: h5py.File, name: str, path: Path) -> str:
+    return _text(_long_bytes(file, name, path))
+
+
+def _refuse_changed_configuration(file: h5py.File, attributes: Mapping[str, Any], path: Path) -> None:
+    """What it says of unit and instruments nothing else in the recording knows. Files of an older vibrigd have no digest."""
+    if DIGEST not in attributes:
+        return
+    expected = _text(attributes[DIGEST])
+    found = hashlib.sha256(_long_bytes(file, "configuration", path)).hexdigest()
+    if found != expected:
+        raise FormatError(f"{path}: /configuration: found SHA-256 {found}, expected {expected:.64} of attribute {DIGEST}: "
+                          "it is not what was recorded")
 
 
 @contextlib.contextmanager
@@ -482,6 +501,7 @@ def _read_part(path: Path) -> _Part:
         if attributes["format_version"] != FORMAT_VERSION:
             raise FormatError(f"{path}: format_version: found {attributes['format_version']}, expected "
                               f"{FORMAT_VERSION}")
+        _refuse_changed_configuration(file, attributes, path)
         texts = {name: _long_text(file, name, path) for name in ("configuration", "dbc", "plan", "result", "interlocks")}
         segments, columns = {}, {}
         for table in TABLES:
@@ -585,8 +605,19 @@ def open_campaign(path: PathLike) -> Campaign:
                 _join(parts, part)
             else:
                 parts.append(part)
+    _refuse_missing_end(parts)
     with _reading(parts[0].path):
         return _made_of(parts)
+
+
+def _refuse_missing_end(parts: list[_Part]) -> None:
+    """A part is called continued once the next file is there, which may have come since the files were looked for."""
+    last, following = parts[-1], part_name(len(parts) + 1)
+    if last.path.name != part_name(len(parts)) or last.attributes["state"] != CONTINUED:
+        return   # a file of another name stands for itself
+    if not last.path.with_name(following).exists():
+        raise FormatError(f"{last.path}: attribute state: found {CONTINUED}, expected {following} beside it, in which the campaign "
+                          "goes on: it is missing")
 
 
 def _made_of(parts: list[_Part]) -> Campaign:

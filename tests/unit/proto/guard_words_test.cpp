@@ -11,7 +11,8 @@ TEST(GuardWords, ComeBackAsTheyWere) {
     const DaemonWord daemon{
         7, {1, 2, 3, std::numeric_limits<std::uint64_t>::max()}, true, false, true, 9.25, 4};
     EXPECT_EQ(decode_daemon_word(encode(daemon)), daemon);
-    const GuardWord guard{7, GuardCause::stop_disobeyed, 3, true, true, false, true, false, 12.5};
+    const GuardWord guard{
+        7, GuardCause::stop_disobeyed, 3, true, true, false, true, false, 12.5, {"1.2.3"}};
     EXPECT_EQ(decode_guard_word(encode(guard)), guard);
 }
 
@@ -49,6 +50,14 @@ TEST(GuardWords, ARatioThatIsNoneIsRefused) {
         daemon.platform_ratio = ratio;
         EXPECT_FALSE(decode_daemon_word(encode(daemon))) << ratio;
     }
+}
+
+TEST(GuardWords, AVersionThatIsNoTextIsRefused) {
+    GuardWord guard;
+    guard.version = {"1.2\n"};
+    EXPECT_FALSE(decode_guard_word(encode(guard)));
+    guard.version.fill('1');
+    EXPECT_FALSE(decode_guard_word(encode(guard))) << "it has no end";
 }
 
 TEST(GuardWords, FlagsAndCausesThatDoNotExistAreRefused) {

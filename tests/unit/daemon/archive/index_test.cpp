@@ -283,7 +283,11 @@ TEST_F(ArchiveIndex, AnotherCopyOfTheSameEndIsARivalAndTakesNoPlace) {
     index.put(other, true);
     EXPECT_EQ(index.results({}).size(), 2U) << "the genuine one stays";
     other.rig = "other";
+    EXPECT_THAT(index.rivals_of(other), ElementsAre(genuine.key)) << "from somebody's desk";
+    other.unit_serial = "another";
     EXPECT_THAT(index.rivals_of(other), IsEmpty());
+    other.unit_serial.clear();
+    EXPECT_THAT(index.rivals_of(other), IsEmpty()) << "nobody says of which unit";
 }
 
 TEST_F(ArchiveIndex, ADamagedCopyIsNamedAsWhatItIs) {

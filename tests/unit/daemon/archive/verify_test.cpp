@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "daemon/journal/database.hpp"
+#include "daemon/record/hdf5.hpp"
 #include "daemon/record/index.hpp"
 #include "tests/unit/daemon/archive/archived.hpp"
 
 namespace vibrig::archive {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -30,6 +32,32 @@ class Verify : public Archived {
     }
     void edit(const char* sql) const { journal::Database(place().index).execute(sql); }
 };
+
+TEST_F(Verify, WhatWasChangedInTheArchiveIsNotRegisteredAnew) {
+    // GIVEN a campaign in the archive, of which somebody changes the result there
+    add();
+    const fs::path folder = lab() / "rig" / "test-1";
+    {
+        auto file = record::hdf5::File::open((folder / "campaign.h5").string(),
+                                             record::hdf5::File::Mode::write);
+        file.set("/", "state", "finisheD");  // of the same length
+        file.close();
+    }
+    EXPECT_THAT(found(), Contains(AnyOf(HasSubstr("different"), HasSubstr("long, found"))));
+    // WHEN the archive's own folder is added, as after the loss of its index
+    const auto again = [&] { static_cast<void>(deliver(folder.string(), place(), "rig", {})); };
+    try {
+        again();
+        ADD_FAILURE() << "registered";
+    } catch (const Refused& error) {
+        EXPECT_THAT(error.what(), HasSubstr("was damaged or changed in the archive"));
+    }
+    fs::remove(place().index);
+    EXPECT_THROW(again(), Refused);
+    // THEN it is not the genuine one; and the rig's own mends it
+    add();
+    EXPECT_THAT(found(), IsEmpty());
+}
 
 TEST_F(Verify, ComparesTheIndexWithWhatTheRecordingsSay) {
     add();

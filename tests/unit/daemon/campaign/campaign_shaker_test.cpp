@@ -249,5 +249,85 @@ TEST_F(CampaignTest, WhileItIsCommissionedTheShakersLinkIsReadOnly) {
     EXPECT_FALSE(shaker.only_read);
 }
 
+TEST_F(CampaignTest, AfterAStandstillAtRestTheShakerIsReadOnceMore) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    run_rig();
+    for (const CampaignState state : {CampaignState::waiting, CampaignState::slewing}) {
+        ASSERT_TRUE(status().state == state || run_until(state, 60));
+        // WHEN neither this nor the shaker's thread has run for 3 s
+        now += 3 * kSecond;
+        shaker.now.valid = false;
+        campaign->step(now);
+        EXPECT_EQ(status().state, state);
+        // and the shaker is read a second after that
+        for (int i = 0; i < 10; ++i) campaign->step(now += 100 * kMillisecond);
+        EXPECT_EQ(status().state, state);
+        EXPECT_TRUE(shaker.requests.empty()) << "nothing is asked of what is not known";
+        shaker.now.valid = true;
+    }
+    // THEN it goes on to its end
+    EXPECT_TRUE(run_until(CampaignState::finished, 200)) << testing::PrintToString(events);
+}
+
+TEST_F(CampaignTest, AStandstillExcusesNoShakerThatIsSilentAfterIt) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::slewing, 60));
+    now += 3 * kSecond;
+    shaker.now.valid = false;
+    for (int i = 0; i < 20; ++i, now += 100 * kMillisecond) campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::slewing);
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    EXPECT_GE(shaker.stops_asked, 1U);
+}
+
+TEST_F(CampaignTest, ALongStandstillEndsItAtRestToo) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::slewing, 60));
+    now += 11 * kSecond;
+    shaker.now.valid = false;
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+}
+
+TEST_F(CampaignTest, AStandstillWhileItShakesEndsIt) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    now += 3 * kSecond;
+    shaker.now.valid = false;
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    EXPECT_GE(shaker.stops_asked, 1U);
+}
+
+TEST_F(CampaignTest, StandstillsOneAfterTheOtherNeitherHoldItUpNorExcuseASilentShaker) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(status().state == CampaignState::waiting || run_until(CampaignState::waiting, 60));
+    for (int i = 0; i < 200 && status().state == CampaignState::waiting; ++i) {
+        now += 700 * kMillisecond;
+        run_rig();  // 100 ms more
+    }
+    EXPECT_EQ(status().state, CampaignState::slewing) << testing::PrintToString(events);
+    shaker.now.valid = false;
+    // THEN 2 s are left to it, not 2 s after each of them
+    for (int i = 0; i < 3; ++i) campaign->step(now += 800 * kMillisecond);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+}
+
+TEST_F(CampaignTest, AShakerThatIsSilentWithoutAStandstillEndsItAtRestToo) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::slewing, 60));
+    run_rig();
+    shaker.now.valid = false;
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+}
+
 }  // namespace
 }  // namespace vibrig::campaign

@@ -283,7 +283,9 @@ TEST(Together, ContradictionsAreRefused) {
     EXPECT_THAT(complaint("shaker.transport = \"rtu\"", true), HasSubstr("without shaker.device"));
     EXPECT_THAT(complaint("shaker.backoff_min_ms = 6000"), HasSubstr("backoff_min_ms <= "));
     EXPECT_THAT(complaint("can.stale_deadline_ms = 20"), HasSubstr("found stale_deadline_ms"));
-    EXPECT_THAT(complaint("can.sample_rate_hz = 8"), HasSubstr("more than one sample period"));
+    EXPECT_THAT(complaint("can.sample_rate_hz = 8"),
+                HasSubstr("can.sample_rate_hz: found stale_deadline_ms of 100, expected more than "
+                          "one sample period, 125 ms"));
     // Slower no second shows gravity, before each ramp, and levelling has no news for a second.
     const std::string slow =
         "can.stale_deadline_ms = 1500\nshaker.stop_deadline_s = 20\ncampaign.table_g = [0.0]\n";
@@ -348,6 +350,7 @@ TEST(InterlockTable, RefusesWhatWouldNotProtect) {
              Case{"name = \"emergency_stop\"\nreaction = \"alarm\"",
                   "interlock[0].reaction: found \"alarm\" (a string), expected \"abort\""},
              Case{"name = \"can_lost\"\ndwell_s = 0.1", "interlock[0].dwell_s: found 0.1"},
+             Case{"name = \"wrong_vibration\"\ndwell_s = 0.1", "interlock[0].dwell_s: found 0.1"},
              Case{"name = \"loop_open\"\ndwell_s = 1.1", "a number from 0 to 1 s"},
              Case{"name = \"tilt\"\nlimit = nan", "interlock[0].limit: found nan"},
              Case{"name = \"tilt\"\nlatched = false", "an abort latches until acknowledged"},

@@ -115,6 +115,22 @@ TEST(SpectrumKeys, RegistersOfSweepsAreAllThereOrNone) {
 }
 
 /// Else a campaign ends hours later, where it reads back what it has not asked for.
+TEST(WatchdogTimeoutRegister, HoldsATimeoutThatWorks) {
+    const auto said = [](const std::string& text) { return complaint(text, true); };
+    const std::string key = "shaker.registers.watchdog_timeout.scale = ";
+    EXPECT_EQ(said(key + "1\n"), "") << "1.5 s, which it holds as 2 s";
+    // WHEN it is counted in tens of seconds, or in minutes
+    for (const char* scale : {"10\n", "60\n"})
+        EXPECT_THAT(said(key + scale), HasSubstr("1.5 s to be written, which the register holds as "
+                                                 "0 s, expected more than 0.5 s"))
+            << "which switches it off";
+    EXPECT_THAT(said(key + "1\nshaker.watchdog_period_ms = 150\n"),
+                HasSubstr("0.45 s to be written, which the register holds as 0 s"));
+    EXPECT_THAT(said(key + "2\nshaker.watchdog_period_ms = 1000\n"),
+                HasSubstr("holds as 4 s, expected more than 1 s, the feeds' period, and 3 s at "
+                          "most"));
+}
+
 TEST(SetPointsOfAPlan, AreHeldByTheirRegisters) {
     const TemporaryFolder folder;
     const std::string path = folder.file("plan.json");

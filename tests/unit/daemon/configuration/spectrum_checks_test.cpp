@@ -147,6 +147,16 @@ TEST(SpectrumKeys, APlanWithASweepNeedsRegistersRateAndLimits) {
                 HasSubstr("at 6 g, expected 3.0917 g at most, at 8 Hz"));
     EXPECT_THAT(said(R"("from_hz":120,"to_hz":5,"s":300)", 2, whole), HasSubstr("g at most, at"));
     EXPECT_THAT(said(up, 0, whole), HasSubstr("at 0 g, expected a level"));
+    // Where it ends it stays: there a shaking table must not show as a standing one.
+    const std::string slower =
+        whole.substr(0, whole.rfind("can.sample_rate_hz")) + "can.sample_rate_hz = 100\n";
+    for (const char* ends :
+         {R"("from_hz":20,"to_hz":100,"s":300)", R"("from_hz":100,"to_hz":20,"s":300)",
+          R"("from_hz":20,"to_hz":50,"s":300)"})
+        EXPECT_THAT(said(ends, 3, slower),
+                    HasSubstr("until the dwell ends, shows as a standing table does"))
+            << ends;
+    EXPECT_EQ(said(R"("from_hz":20,"to_hz":95,"s":300)", 3, slower), "");
     EXPECT_THAT(said(R"("from_hz":20,"to_hz":120,"s":80000)", 6, whole),
                 HasSubstr("in 80000 s, 0.0019387 octaves a minute, expected 0.01 at least"));
     EXPECT_THAT(said(up, 6, whole + "accelerometer.bandwidth_hz = 60\n"),

@@ -7,6 +7,7 @@
 #include "coil_server.hpp"
 #include "drivers/annunciator/horn.hpp"
 #include "scripts.hpp"
+#include "tests/unit/support/host_names.hpp"
 
 namespace vibrig::guard {
 namespace {
@@ -169,6 +170,21 @@ TEST(Pager, OneThatHangsWithAStopDoesNotHoldUpThatTheStopIsNotObeyed) {
     // THEN nobody has waited for it, and its end took the child along
     EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(300));
     EXPECT_TRUE(eventually([&] { return dead(script.process_of("child")); }));
+}
+
+TEST(Pager, DoesNotWaitForAHornThatIsStillBeingLookedUp) {
+    // GIVEN a horn whose name server is dead
+    const Script script("cat >paged.new && mv paged.new paged");
+    HostName horn("horn.test", {"127.0.0.1"}, HostName::Server::is_silent);
+    auto settings = with(script);
+    settings.host = "horn.test";
+    settings.port = 9;
+    Alarm alarm(settings);
+    EXPECT_TRUE(eventually([&] { return horn.asked(); }));
+    // WHEN something happens, THEN somebody is paged, though the server never answers
+    alarm.page(Tune::stop, "stopped");
+    EXPECT_TRUE(eventually([&] { return !script.text_of("paged").empty(); }));
+    horn.answer();  // its end waits for the look-up
 }
 
 TEST(Pager, WhatHangsIsKilledWithItsChildrenWhenItsTimeIsUp) {

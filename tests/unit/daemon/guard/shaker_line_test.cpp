@@ -6,6 +6,8 @@
 #include <chrono>
 
 #include "test_server.hpp"
+#include "tests/unit/support/host_names.hpp"
+#include "tests/unit/support/mute_host.hpp"
 
 namespace vibrig::guard {
 namespace {
@@ -187,6 +189,20 @@ TEST(ShakerLine, AControllerThatDoesNotAnswerCostsHalfASecondAndIsSoughtAgain) {
     line.step(kSecond, true);
     EXPECT_TRUE(line.word(kSecond).known);
     EXPECT_TRUE(line.note().empty());
+}
+
+TEST(ShakerLine, StopsAtWhicheverAddressOfTheNameTheControllerIs) {
+    TestServer server;
+    server.set_holding(kRun, 1);
+    // GIVEN a name whose first address swallows what comes
+    const MuteHost first("127.0.0.2", server.port(), MuteHost::Takes::nothing);
+    const HostName name("controller.test", {"127.0.0.2", "127.0.0.1"});
+    auto settings = settings_of(server);
+    settings.host = "controller.test";
+    ShakerLine line(settings);
+    line.step(kSecond, true);
+    EXPECT_EQ(server.holding(kRun), 0) << line.note();
+    EXPECT_TRUE(line.word(kSecond).known) << line.note();
 }
 
 TEST(ShakerLine, WhatWasReadTwoSecondsAgoIsNotKnownAnyMore) {

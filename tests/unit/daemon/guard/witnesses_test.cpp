@@ -7,6 +7,8 @@
 #include <cstring>
 #include <fstream>
 #include <numbers>
+#include <string>
+#include <string_view>
 
 namespace vibrig::guard {
 namespace {
@@ -23,8 +25,8 @@ WitnessSettings stated() {
 /// Frames as the rig sends them, by the codec.
 class Bus {
   public:
-    explicit Bus(Witnesses& witnesses)
-        : witnesses_(witnesses), dbc_(proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")) {}
+    explicit Bus(Witnesses& witnesses, std::string_view dbc = proto::rig_dbc_text())
+        : witnesses_(witnesses), dbc_(proto::parse_dbc(dbc, "rig.dbc")) {}
 
     void send(const char* message, std::initializer_list<std::pair<const char*, double>> values,
               drivers::Time time) {
@@ -295,6 +297,50 @@ TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
     EXPECT_FALSE(sight.platform.known);
     EXPECT_TRUE(sight.table.known);
     EXPECT_FALSE(sight.rests(safety::kRest_g)) << "a witness that is not known does not rest";
+}
+
+TEST(Witnesses, AValidityThatIsOutOfItsRangeIsNotBelieved) {
+    // GIVEN a validity of two bits, of which 2 is an error and 3 not available
+    std::string text(proto::rig_dbc_text());
+    const std::string_view one_bit = "YValid : 49|1@1+";
+    text.replace(text.find(one_bit), one_bit.size(), "YValid : 50|2@1+");
+    const TemporaryFolder folder;
+    WitnessSettings settings = stated();
+    settings.dbc = folder.file("two_bits.dbc");
+    std::ofstream(settings.dbc) << text;
+    for (const int validity : {0, 1, 2, 3}) {
+        Witnesses witnesses(settings);
+        Bus bus(witnesses, text);
+        for (int i = 0; i < 80; ++i) {
+            bus.now += kPeriod;
+            bus.send("AccelerometersXY", {{"X", 0}, {"Y", 1}, {"XValid", 1}, {"YValid", validity}},
+                     bus.now);
+            bus.send("AccelerometerZ", {{"Z", 0}, {"ZValid", 1}}, bus.now);
+        }
+        EXPECT_EQ(witnesses.sight(bus.now).platform.known, validity == 1) << validity;
+    }
+}
+
+TEST(Witnesses, WhatIsOutOfItsRangeIsNotSeen) {
+    constexpr double kBeyond_g = 31.9;  // of a DBC that says 31 g
+    Witnesses witnesses{stated()};
+    Bus bus(witnesses);
+    // GIVEN readings that stand at a code for an error
+    for (int i = 0; i < 80; ++i) bus.sample(kBeyond_g, kBeyond_g - 1, bus.now += kPeriod);
+    auto sight = witnesses.sight(bus.now);
+    EXPECT_FALSE(sight.table.known);
+    EXPECT_FALSE(sight.platform.known);
+    EXPECT_FALSE(sight.rests(safety::kRest_g));
+    // WHEN it comes now and then THEN the others tell what moves
+    for (int i = 0; i < 80; ++i) {
+        bus.now += kPeriod;
+        const double wave = std::sin(2 * std::numbers::pi * 15 * drivers::to_seconds(bus.now));
+        bus.sample(i % 10 == 0 ? kBeyond_g : 5 * wave, 3 * wave, bus.now);
+    }
+    sight = witnesses.sight(bus.now);
+    ASSERT_TRUE(sight.table.known && sight.platform.known);
+    EXPECT_NEAR(sight.table.peak_g, 5, 0.5);
+    EXPECT_NEAR(sight.platform.peak_g, 3, 0.3);
 }
 
 TEST(Witnesses, ASilentBusIsNeitherRestNorMotion) {

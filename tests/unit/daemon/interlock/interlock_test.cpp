@@ -119,6 +119,26 @@ TEST_F(InterlockTest, TripsOnTheEmergencyStopAndOnALostBus) {
     EXPECT_EQ(interlock.tripped(), Trip::can_lost);
 }
 
+TEST_F(InterlockTest, TheEmergencyStopTripsWhereTheAmplitudeIsNoNumberAnyMore) {
+    // GIVEN a controller whose power stage was cut: it has no amplitude
+    drivers::ShakerReading reading;
+    reading.fresh = true;
+    reading.measured_g = std::numeric_limits<double>::quiet_NaN();
+    for (const Guard guard : {Guard::armed, Guard::excitation}) {
+        interlock.guard(guard);
+        // WHEN the chain is open in the same reply THEN it is that, and not a lost read-back
+        reading.emergency_stop_open = true;
+        interlock.check(reading);
+        EXPECT_EQ(interlock.tripped(), Trip::emergency_stop);
+        interlock.acknowledge(interlock.latched());
+        // Without it, an amplitude that is no number is none within its limit.
+        reading.emergency_stop_open = false;
+        interlock.check(reading);
+        EXPECT_EQ(interlock.tripped(), Trip::over_amplitude);
+        interlock.acknowledge(interlock.latched());
+    }
+}
+
 TEST_F(InterlockTest, TakesPlatformAndTableForNothingWhileNothingMayMove) {
     platform.loop_closed = false;
     sample.table_accel = 99;

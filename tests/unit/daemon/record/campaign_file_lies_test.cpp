@@ -131,6 +131,8 @@ TEST_F(Lies, OfNumbersThatDoNotFitAreRefused) {
     refused("/orders/run", "row 2: found 1099511627776, expected a number that fits its column");
     attribute("part", 1LL << 40);
     refused("attribute part", "found 1099511627776, expected a number that it can be");
+    attribute("part", 0);
+    refused("attribute part", "found 0, expected 1 or more");
 }
 
 TEST_F(Lies, OfOrdersWithoutNumbersAreRefused) {

@@ -135,6 +135,20 @@ TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
                  std::runtime_error);
 }
 
+TEST_F(Parts, AreRefusedWhenTheLastOneIsMissing) {
+    for (const int part : {1, 2})
+        write(head(part), part * 100 * kSecond, {part}, 1, part == 2 ? "finished" : "continued");
+    ASSERT_EQ(refusal(), "");
+    fs::remove(folder_ / "campaign-2.h5");
+    EXPECT_NE(refusal().find("missing campaign-2.h5 of campaign test-1, in which campaign.h5 says "
+                             "that the campaign goes on"),
+              std::string::npos)
+        << refusal();
+    // Put aside by somebody it stands for itself.
+    fs::rename(folder_ / "campaign.h5", folder_ / "first.h5");
+    EXPECT_EQ(read_campaign((folder_ / "first.h5").string()).state, kContinued);
+}
+
 /// Three segments of a raw log, a minute each, and another's log of the time between.
 class RawSegments : public Parts {
   protected:

@@ -41,6 +41,36 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     EXPECT_EQ(file(path), bytes);
 }
 
+TEST_F(Recording, OfWhichTheLastPartDiedIsMendedFromWithinItsFolderToo) {
+    // GIVEN a campaign that went on in a second file, whose writer died
+    const fs::path folder = folder_ / "test-1";
+    fs::create_directories(folder);
+    Head of = head();
+    of.campaign = "test-1";
+    {
+        CampaignWriter writer((folder / "campaign.h5").string(), of);
+        for (const auto& sample : samples(500, 0)) writer.put(sample);
+        writer.end({kContinued, "", "", "", of.utc_ns});
+    }
+    of.part = 2;
+    {
+        CampaignWriter writer((folder_ / "living.h5").string(), of);
+        for (const auto& sample : samples(500, 100 * drivers::kSecond)) writer.put(sample);
+        writer.commit();
+        fs::copy_file(folder_ / "living.h5", folder / "campaign-2.h5");
+    }
+    // WHEN its first file is named without a folder, and as somebody types it
+    const fs::path back = fs::current_path();
+    fs::current_path(folder);
+    const Recovery recovery = recover("campaign.h5", {}).at(0);
+    fs::current_path(back);
+    // THEN the part that died is mended
+    EXPECT_FALSE(recovery.was_closed);
+    EXPECT_EQ(recovery.parts, 2U);
+    EXPECT_EQ(recovery.samples, 1000U);
+    EXPECT_EQ(read_campaign(folder.string() + "//campaign.h5").state, "recovered");
+}
+
 TEST_F(Recording, WithoutItsHdf5FileIsNamed) {
     // GIVEN a campaign, and a folder of which the raw log alone is left
     const fs::path one = folder_ / "one", gone = folder_ / "gone";

@@ -86,6 +86,46 @@ TEST_F(Recording, IsComparedInEveryColumnOfItsDwells) {
               "");
 }
 
+TEST_F(Recording, HasNoMoreAndNoFewerDwellsThanItsReplay) {
+    // GIVEN a campaign that ended, and its dwells
+    Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
+    campaign.dwells = replay(campaign, {}, {}).dwells;
+    campaign.state = "finished";
+    ASSERT_TRUE(replay(campaign, {}, {}).as_recorded());
+    Campaign longer = campaign, shorter = campaign;
+    // WHEN one of them is there twice, or is not there
+    longer.dwells.push_back(longer.dwells.back());
+    shorter.dwells.pop_back();
+    // THEN it is not as recorded
+    EXPECT_EQ(replay(longer, {}, {}).first_difference, "/dwells: found 3 rows, the replay gives 2");
+    EXPECT_EQ(replay(shorter, {}, {}).first_difference,
+              "/dwells: found 1 rows, the replay gives 2");
+    EXPECT_FALSE(replay(longer, {}, {}).as_recorded());
+    // What a daemon that was killed had not written yet is no difference.
+    shorter.state = "recovered";
+    EXPECT_TRUE(replay(shorter, {}, {}).as_recorded());
+}
+
+TEST_F(Recording, HasTheLevelsThatWereCommanded) {
+    // GIVEN a campaign with what was commanded, each second
+    Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
+    for (const Order& order : campaign.orders)
+        for (drivers::Time at = order.from; at < order.to; at += drivers::kSecond) {
+            ConditionRow& row = campaign.conditions.emplace_back();
+            row.time = at;
+            row.command_g = at < order.from + drivers::kSecond ? 0 : order.table_g;
+        }
+    ASSERT_EQ(replay(campaign, {}, {}).first_difference, "");
+    // WHEN the level of one dwell is another
+    campaign.orders[1].table_g = 7;
+    EXPECT_EQ(replay(campaign, {}, {}).first_difference,
+              "run 1 position 2: /orders/table_g: row 2: found 7, expected 9 as in "
+              "/conditions/command_g of its time");
+    // Nobody says what was commanded: of raw logs.
+    campaign.conditions.clear();
+    EXPECT_EQ(replay(campaign, {}, {}).first_difference, "");
+}
+
 TEST_F(Recording, IsComparedWithItsEstimates) {
     Campaign campaign = two_dwells(samples(4000, drivers::kSecond));
     campaign.dwells = replay(campaign, {}, {}).dwells;

@@ -287,6 +287,13 @@ TEST_P(ReportAtARate, SaysWhatIsRightAtThatRate) {
     expect_printed(page, bound, analysis);
     EXPECT_EQ(page.find("identified anew"), std::string::npos);
     EXPECT_NE(page.find("probability of about 95 %"), std::string::npos);
+    // Where the recording's own result is another, it says so in place of how the dwells are.
+    EXPECT_NE(page.find("no dwell to compare"), std::string::npos);
+    analysis.not_as_recorded = "/result: parameters D_Fx value: found 1, the replay gives 2";
+    const std::string altered = make_page(campaign, analysis, {});
+    EXPECT_NE(altered.find("is not that of its dwells: " + analysis.not_as_recorded),
+              std::string::npos);
+    EXPECT_EQ(altered.find("no dwell to compare"), std::string::npos);
     // Identified with other settings, it says with which, and has their coverage.
     analysis.anew_with = "other.toml";
     analysis.settings.uncertainty.coverage = 0.5;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -121,6 +122,18 @@ TEST(AssessOverFrequency, WhatCountsDwellsCountsThemAll) {
     EXPECT_THAT(all.assessed.verdict.sentence, HasSubstr("valid: 33 degrees of freedom"));
     EXPECT_THAT(all.assessed.verdict.sentence, HasSubstr("; over frequency: 63 dwells"));
     EXPECT_THAT(one.assessed.verdict.sentence, Not(HasSubstr("over frequency")));
+}
+
+TEST(AssessOverFrequency, ADwellOfAnotherFrequencyThatDoesNotFitIsDoubtfulAndTakenIntoU) {
+    std::vector<DwellRow> rows = rows_of(Truth::common(0.5, kSixty), 1);
+    EXPECT_THAT(words_of(assessed(rows)), Not(HasSubstr("do not fit coefficients of each")));
+    // GIVEN a dwell in which gyro z drifted by 28 times the noise, not at the reference frequency
+    std::ranges::find(rows, 45.0, &DwellRow::commanded_hz)->rate[2] += 0.2;
+    const Assessed found = assessed(rows);
+    // THEN that is said, of this frequency and gyro, and the coefficients are covered still
+    EXPECT_EQ(found.assessed.verdict.level, estimator::uncertainty::Level::doubtful);
+    EXPECT_THAT(words_of(found), HasSubstr("gyro z at 45 Hz least: taken into u"));
+    EXPECT_LT(worst(found), 4);
 }
 
 TEST(AssessOverFrequency, MotionInStepIsLookedForAtAllFrequencies) {

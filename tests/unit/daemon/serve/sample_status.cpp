@@ -34,7 +34,7 @@ StatusData full_status() {
     s.remaining_s = 750;
     s.command_table_g = 9;
     s.command_frequency_hz = 15;
-    s.shaker = {1'234'400'000'000, true, 15, 9, 8.9987, 2, 4, true, true};
+    s.shaker = {1'234'400'000'000, true, true, 15, 9, 8.9987, 2, 4, true, true};
     s.shaker_link = drivers::LinkState::degraded;
     s.shaker_counters = {11, 12, 13, 14, 15, 16, 17, 18, 19};
     s.can = drivers::PortState::running;
@@ -127,7 +127,8 @@ StatusData full_status() {
                true,
                true,
                true,
-               5.0};
+               5.0,
+               "0.0.9"};
     s.annunciator = {true, true, "no answer", drivers::HornPattern::abort, true, 3, 1,
                      1,    1,    "it hung"};
     s.witness_g = {8.9, 9.1};
@@ -216,6 +217,8 @@ StatusData full_status() {
     for (std::size_t i = 0; i < coefficients.size(); ++i)
         coefficients[i] = {0.5 + static_cast<double>(i), 0.02};
     s.verdict.coefficients = std::make_shared<const decltype(coefficients)>(coefficients);
+    s.verdict.combinations = std::make_shared<const std::vector<VerdictStatus::Combination>>(
+        1, VerdictStatus::Combination{{{"D_Fx", 1}, {"D_OOx", 19}}, 0.75, 0.04});
     s.noise.angle_in_force_arcsec = 5;
     s.noise.block_s = 1;
     s.noise.dwells = 81;

@@ -241,6 +241,10 @@ TEST(StatusJson, UncertaintiesStandBesideWhatTheFilterHas) {
     EXPECT_FALSE(all.assessed().parameters(1).has_value());
     EXPECT_FALSE(all.assessed().parameters(1).has_u());
     EXPECT_NE(all.parameters(0).value(), 0.5);
+    ASSERT_EQ(all.assessed().combinations_size(), 1);
+    EXPECT_EQ(all.assessed().combinations(0).weights().at("D_OOx"), 19.0);
+    EXPECT_EQ(all.assessed().combinations(0).value(), 0.75);
+    EXPECT_EQ(all.assessed().combinations(0).u(), 0.04);
     // and before there is one, nothing is in its place
     EXPECT_FALSE(parsed<v1::Parameters>(parameters_json(full_result(), {})).has_assessed());
 }

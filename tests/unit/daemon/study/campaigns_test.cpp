@@ -26,6 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 // Short dwells at few positions: many tasks, nothing determined.
 constexpr const char* kShort = R"([study]
@@ -202,8 +204,8 @@ TEST(StudyCampaigns, ThatThrowAreResultsThatSayWhy) {
         "[study]\nname='a'\nkind='campaigns'\n[campaign]\ndwell_s=2\ntable_g=[9, 7]\n[rig]\n"
         "\"shaker.limit_g\" = 5\n",
         "S.toml");
-    const auto checked = check_campaigns(study, "S.toml");
-    CampaignWorker worker(study, checked.sequences);
+    const auto sequences = check_campaigns(study, "S.toml");
+    CampaignWorker worker(study, sequences);
     EXPECT_THAT(decode(worker.run(0)).failed, HasSubstr("shaker"));
 }
 
@@ -211,8 +213,8 @@ TEST(StudyCampaigns, ThatThrowAreResultsThatSayWhy) {
 TEST(StudyCampaigns, AreWhatTheEstimatorMakesOfTheSimulatedRig) {
     const Study study = parse_study(
         "[study]\nname='a'\nkind='campaigns'\nseed=3\n[campaign]\ndwell_s=5\n", "S.toml");
-    const auto checked = check_campaigns(study, "S.toml");
-    CampaignWorker worker(study, checked.sequences);
+    const auto sequences = check_campaigns(study, "S.toml");
+    CampaignWorker worker(study, sequences);
     const CampaignRecord record = decode(worker.run(0));
     ASSERT_EQ(record.failed, "");
 
@@ -220,8 +222,7 @@ TEST(StudyCampaigns, AreWhatTheEstimatorMakesOfTheSimulatedRig) {
     truth.seed = Draws(3, 0, "noise").bits();
     plant::CampaignPlan plan;
     plan.dwell_s = 5;
-    for (const std::size_t at : checked.sequences[0])
-        plan.order.emplace_back(at / 14 + 1, at % 14 + 1);
+    for (const std::size_t at : sequences[0]) plan.order.emplace_back(at / 14 + 1, at % 14 + 1);
     estimator::Identification identification({});
     bool in_dwell = false;
     double begin_s = 0;
@@ -263,8 +264,8 @@ TEST(StudyCampaigns, SampleAsTheConfigurationSays) {
         const Study study = parse_study(
             "[study]\nname='a'\nkind='campaigns'\nseed=3\n[campaign]\ndwell_s=5\n" + more,
             "S.toml");
-        const auto checked = check_campaigns(study, "S.toml");
-        CampaignWorker worker(study, checked.sequences);
+        const auto sequences = check_campaigns(study, "S.toml");
+        CampaignWorker worker(study, sequences);
         const CampaignRecord record = decode(worker.run(0));
         EXPECT_EQ(record.failed, "");
         return record.error;
@@ -277,6 +278,22 @@ TEST(StudyCampaigns, SampleAsTheConfigurationSays) {
     EXPECT_EQ(run("[rig]\nplatform.sample_rate_hz=40\n"), run(""));
 }
 
+TEST(StudyCampaigns, ThatContradictTheirConfigurationAreNotValid) {
+    const auto run = [](const std::string& rig) {
+        const Study study = parse_study(
+            "[study]\nname='a'\nkind='campaigns'\nseed=3\n[campaign]\ndwell_s=5\n" + rig, "S.toml");
+        const auto sequences = check_campaigns(study, "S.toml");
+        CampaignWorker worker(study, sequences);
+        return decode(worker.run(0));
+    };
+    EXPECT_THAT(run("").reasons, Not(HasSubstr("configuration")));
+    // An accelerometer's zero of 0.86 deg, which the configuration does not know.
+    const CampaignRecord wrong = run("[rig]\n'accelerometer.zero_g' = [0.015, 0, 0]\n");
+    EXPECT_EQ(wrong.failed, "");
+    EXPECT_EQ(wrong.verdict, static_cast<std::uint8_t>(estimator::uncertainty::Level::not_valid));
+    EXPECT_THAT(wrong.reasons, StartsWith("configuration"));
+}
+
 /// As in a live campaign: the filter takes the angles' noise from the dwells before.
 TEST(StudyCampaigns, LearnTheNoiseFromTheDwellsBefore) {
     const auto u_with = [](const std::string& noise) {
@@ -285,8 +302,8 @@ TEST(StudyCampaigns, LearnTheNoiseFromTheDwellsBefore) {
             "'noise.resolver_arcsec' = " +
                 noise + "\n",
             "S.toml");
-        const auto checked = check_campaigns(study, "S.toml");
-        CampaignWorker worker(study, checked.sequences);
+        const auto sequences = check_campaigns(study, "S.toml");
+        CampaignWorker worker(study, sequences);
         return decode(worker.run(0)).u_a;
     };
     const auto quiet = u_with("5"), noisy = u_with("7");
@@ -298,7 +315,7 @@ TEST(StudyCampaigns, LearnTheNoiseFromTheDwellsBefore) {
 TEST(StudyCampaigns, SayWhatTheyTake) {
     const auto expected = [](const std::string& text) {
         const Study study = parse_study("[study]\nname='a'\nkind='campaigns'\n" + text, "S.toml");
-        return expected_task_s(study, check_campaigns(study, "S.toml").sequences);
+        return expected_task_s(study, check_campaigns(study, "S.toml"));
     };
     const double base_s = expected("[campaign]\ndwell_s=10\n");
     EXPECT_NEAR(expected("[campaign]\ndwell_s=100\n"), 10 * base_s, 1e-9);

@@ -362,6 +362,22 @@ TEST_F(StudyParts, BelongToAStudyThatIsAsPlanned) {
     other = folder_;
     other.arithmetic = "0000000000000000";
     EXPECT_THROW(prepare_to_run(other), StudyError);
+    // AND with the configuration of today
+    const auto complaint = [&]() -> std::string {
+        try {
+            prepare_to_run(other);
+        } catch (const StudyError& error) {
+            return error.what();
+        }
+        return "none";
+    };
+    other = folder_;
+    auto& [key, value] = other.configuration.back();
+    const std::string here = std::exchange(value, "42");
+    EXPECT_EQ(complaint(), path + "/study.json: configuration: found " + key + " 42, expected " +
+                               key + " " + here + ", as STUDY.toml gives it here: plan it anew");
+    other.configuration.pop_back();
+    EXPECT_THAT(complaint(), HasSubstr("configuration: found nothing, expected "));
     std::ofstream(path + "/STUDY.toml", std::ios::app) << "# a word\n";
     try {
         static_cast<void>(open_study(path));

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "daemon/record/campaign_writer.hpp"
+#include "daemon/study/identified_recording.hpp"
 #include "daemon/study/merge.hpp"
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/run.hpp"
@@ -173,6 +175,22 @@ TEST_F(StudyRecordings, AreIdentifiedWithTheStudysSettings) {
               "site.x = 2\nnoise.resolver_arcsec = 7\n");
     EXPECT_THAT(complaint([&] { plan("wrong", "[identify]\nsite.latitude_deg = 100\n"); }),
                 HasSubstr("wrong.toml:6:21: site.latitude_deg: found 100"));
+}
+
+TEST_F(StudyRecordings, ThatContradictTheirConfigurationAreNotValid) {
+    record("a", "17", 0);
+    const auto contradicts = [&](const Folder& folder) {
+        const Study& study = folder.study;
+        const auto found = identify_recording(study.recordings.at(0), study.configuration);
+        return std::ranges::any_of(found.assessed.verdict.reasons, [](const auto& reason) {
+            return reason.code == "configuration";
+        });
+    };
+    EXPECT_FALSE(contradicts(plan("fits")));
+    // An accelerometer's zero of 0.86 deg, which the rig does not have.
+    const Folder wrong = plan("wrong", "[identify]\naccelerometer.zero_g = [0.015, 0, 0]\n");
+    EXPECT_TRUE(contradicts(wrong));
+    EXPECT_EQ(run(wrong)["recordings"][0]["new"]["verdict"], "not valid");
 }
 
 TEST_F(StudyRecordings, AreSelectedBySerialAndDay) {

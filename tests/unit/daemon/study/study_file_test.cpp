@@ -38,7 +38,7 @@ table_g = [9.0, 7.0]
                                     "S.toml");
     EXPECT_EQ(study.points(), 2U);
     EXPECT_EQ(study.tasks(), 2000U);
-    EXPECT_EQ(check_campaigns(study, "S.toml").sequences.size(), 2U);
+    EXPECT_EQ(check_campaigns(study, "S.toml").size(), 2U);
 }
 
 TEST(StudyFile, OfThreeAxesCountsTheFirstSlowest) {

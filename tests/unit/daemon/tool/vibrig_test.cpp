@@ -40,6 +40,30 @@ TEST_F(VibrigOptions, AnEmptyValueIsNoDefault) {
     EXPECT_NE(error.find("--truth: found nothing"), std::string::npos) << error;
 }
 
+TEST_F(VibrigOptions, AnEmptyElementOfAListIsNamed) {
+    // GIVEN lists in which a variable that is not set left nothing between two commas, or at an end
+    for (const auto& [option, arguments] :
+         {std::pair{"--levels", "plan --levels 0,,6"}, std::pair{"--levels", "plan --levels=0,6,"},
+          std::pair{"--levels", "plan --levels 0 4,,6"},
+          std::pair{"--without", "plan --without ,D12"},
+          std::pair{"--spheres", "plan --turntable --spheres [1,,2]"},
+          std::pair{"--tilt", "level simulate --tilt 30,,-20"},
+          std::pair{"--without", "calibrate a.csv --without D12,,D13"},
+          std::pair{"--attitude", "compensate c --attitude 1,,2,3"},
+          std::pair{"--reference", "allan a.txt --tau0 1 --dynamic 9 --reference 1,,2,3,4,5"}}) {
+        // WHEN they are read THEN each is named
+        expect_refusal(arguments, std::string(option) + ": found '");
+        EXPECT_NE(error.find("', expected something between commas"), std::string::npos) << error;
+    }
+    // AND so does the simulated rig
+    EXPECT_EQ(run(VIBRIG_PLANT, "record -o x.csv --table-g 9,,7"), 2);
+    EXPECT_NE(error.find("--table-g: found '9,,7'"), std::string::npos) << error;
+    // AND what is no element of one is taken as it is
+    write("a,,b.csv", "no positions\n");
+    expect_refusal("plan --outer -90,90 --positions a,,b.csv", "a,,b.csv");
+    EXPECT_EQ(error.find("between commas"), std::string::npos) << error;
+}
+
 TEST_F(VibrigOptions, AnOutputIsNoInputAndNoRecording) {
     // GIVEN what is read, and a campaign
     const std::string rows = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";

@@ -11,9 +11,12 @@
 #include <chrono>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <thread>
 
+#include "daemon/version.hpp"
 #include "proto/safety.hpp"
 
 namespace vibrig::watch {
@@ -51,8 +54,8 @@ class FakeGuard {
         if (size <= 0) return {};
         return proto::decode_daemon_word({bytes.data(), static_cast<std::size_t>(size)});
     }
-    void say(const proto::GuardWord& word) const {
-        const auto bytes = proto::encode(word);
+    void say(const proto::GuardWord& word) const { say_bytes(proto::encode(word)); }
+    void say_bytes(std::span<const std::uint8_t> bytes) const {
         EXPECT_EQ(::send(link_, bytes.data(), bytes.size(), MSG_NOSIGNAL),
                   static_cast<ssize_t>(bytes.size()));
     }
@@ -134,6 +137,7 @@ TEST_F(GuardLinkTest, HearsAFindingUntilAPersonHasSeenIt) {
     answer.finding = 3;
     answer.sees = true;
     answer.table_g = 11;
+    std::string_view(kVersion).copy(answer.version.data(), answer.version.size() - 1);
     std::optional<proto::DaemonWord> word = first;
     const auto answered = [&](const auto& holds) {
         return until([&] {
@@ -155,6 +159,36 @@ TEST_F(GuardLinkTest, HearsAFindingUntilAPersonHasSeenIt) {
     // AND a second finding is not that one
     answer.finding = 4;
     EXPECT_TRUE(answered([&] { return link_.finding() == proto::GuardCause::over_level; }));
+}
+
+TEST_F(GuardLinkTest, AGuardOfAnotherVersionIsHeardAndNamed) {
+    FakeGuard guard(name_);
+    link_.start();
+    std::array<char, 16> version{"0.0.9"};
+    EXPECT_TRUE(until([&] {
+        const auto word = guard.next();
+        if (!word) return false;
+        proto::GuardWord answer;
+        answer.sequence = word->sequence;
+        answer.version = version;
+        guard.say(answer);
+        return link_.status().version == "0.0.9";
+    }));
+    EXPECT_TRUE(link_.status().heard);
+    EXPECT_EQ(link_.status().note,
+              std::string("version 0.0.9, vibrigd is ") + kVersion + ": restart vibrig-guard");
+}
+
+TEST_F(GuardLinkTest, WordsThatItDoesNotKnowAreSaidToBeSo) {
+    FakeGuard guard(name_);
+    link_.start();
+    ASSERT_TRUE(guard.next());
+    // WHEN a guard answers as it did before its words had a version
+    guard.say_bytes(std::array<std::uint8_t, 32>{0x56, 0x62, 0x47, 0x31});
+    // THEN it is not heard, and what is to be done is said
+    EXPECT_TRUE(until([&] { return link_.status().note != "never heard"; }));
+    EXPECT_THAT(link_.status().note, HasSubstr("does not know: restart vibrig-guard"));
+    EXPECT_FALSE(link_.heard());
 }
 
 TEST_F(GuardLinkTest, WhatAnswersNoWordOfThisLifeIsNotHeard) {

@@ -6,6 +6,7 @@
 
 #include "coil_server.hpp"
 #include "scripts.hpp"
+#include "tests/unit/support/host_names.hpp"
 
 namespace vibrig::drivers::test {
 namespace {
@@ -70,6 +71,22 @@ TEST(Annunciator, NobodyWaitsForACommandThatHangsAndWhatPilesUpIsBounded) {
         EXPECT_LE(annunciator.status().left_out, 1000u - 16u);
     }
     EXPECT_LT(steady_clock::now() - begun, std::chrono::seconds(300)) << "its end waits for none";
+}
+
+TEST(Annunciator, APageDoesNotWaitForAHornThatIsStillBeingLookedUp) {
+    // GIVEN a horn whose name server is dead
+    const Script script("cat >paged.new && mv paged.new paged");
+    HostName horn("horn.test", {"127.0.0.1"}, HostName::Server::is_silent);
+    auto settings = with_command(script);
+    settings.horn.host = "horn.test";
+    settings.horn.port = 9;
+    Annunciator annunciator(settings, {});
+    EXPECT_TRUE(eventually([&] { return horn.asked(); }));
+    // WHEN something happens, THEN somebody is paged, though the server never answers
+    annunciator.announce(HornPattern::abort, "tripped");
+    EXPECT_TRUE(eventually([&] { return !script.text_of("paged").empty(); }));
+    EXPECT_TRUE(eventually([&] { return annunciator.status().started == 1; }));
+    horn.answer();  // its end waits for the look-up
 }
 
 TEST(Annunciator, AFailureOfTheCommandIsSaidAndCounted) {

@@ -6,6 +6,8 @@
 
 #include "manual_clock.hpp"
 #include "test_bench.hpp"
+#include "tests/unit/support/host_names.hpp"
+#include "tests/unit/support/mute_host.hpp"
 
 namespace vibrig::drivers::test {
 namespace {
@@ -53,6 +55,31 @@ TEST(ShakerStop, CutsOffAHangingRequestAndIsTheNextWrite) {
     EXPECT_EQ(writes.front().connection, 2);
     EXPECT_EQ(bench.shaker->counters().timeouts, 0U);
     EXPECT_EQ(bench.shaker->counters().lost, 1U);
+}
+
+TEST(ShakerStop, IsNotHeldUpByADeadAddressOfTheName) {
+    // GIVEN a name with two addresses, of which the second is the shaker's, and a request in flight
+    std::atomic<bool> hung = false;  // before the server, whose thread asks it to the end
+    TestServer server;
+    const HostName name("shaker.test", {"127.0.0.2", "127.0.0.1"});
+    ShakerSettings settings = settings_for(server);
+    settings.host = "shaker.test";
+    settings.response_timeout = 60 * kSecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply(kRunning));
+    server.script([&](const Request& request) {
+        if (request.connection != 1) return Answer{};
+        hung = true;
+        return Answer{Kind::hang, 0, {}};
+    });
+    ASSERT_TRUE(bench.eventually([&] { return hung.load(); }));
+    // WHEN it is stopped, while nothing that comes to the first address is answered
+    const MuteHost first("127.0.0.2", server.port());
+    bench.shaker->stop_now();
+    // THEN the stop goes to the second at once
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    EXPECT_FALSE(first.called());
+    EXPECT_EQ(server.holding(kRun), 0);
 }
 
 TEST(ShakerStop, LeavesNoSetPointBehind) {

@@ -284,6 +284,18 @@ TEST(WatchdogTimeout, IsLookedAtAllTheTimeAndAChangeIsSeen) {
     }
 }
 
+TEST(WatchdogTimeout, ThatItsRegisterRoundsToNothingIsNone) {
+    // GIVEN a register of tens of seconds: 1.5 s are written, and read back, as 0
+    TestServer server;
+    ShakerSettings settings = settings_for(server);
+    settings.watchdog_period = 500 * kMillisecond;
+    settings.registers.watchdog_timeout.scale = 10;
+    Bench bench(settings);
+    EXPECT_TRUE(bench.eventually(
+        [&] { return bench.shaker->reading().watchdog == WatchdogTimeout::changed; }));
+    EXPECT_FALSE(bench.request({15.0, 1.0, 1.0}));
+}
+
 TEST(WatchdogTimeout, ThatIsSwallowedOrScaledOnTheWayIsSeen) {
     for (const auto kind : {Kind::ignore_write, Kind::exception}) {
         TestServer server;

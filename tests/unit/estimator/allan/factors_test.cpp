@@ -19,6 +19,7 @@ TEST(Factors, ListsAreCheckedAgainstTheRecord) {
     EXPECT_EQ(log_factors(0, 4).size(), 0U);
     EXPECT_EQ(factors_of(std::array{0.1, 0.3}, 0.1, 5), (std::vector<std::size_t>{1, 3}));
     EXPECT_THROW(static_cast<void>(factors_of(std::array{0.25}, 0.1, 5)), DataError);
+    EXPECT_THROW(static_cast<void>(factors_of(std::array{0.1, 0.3, 0.1}, 0.1, 5)), DataError);
     EXPECT_THROW(static_cast<void>(factors_of(std::array{0.6}, 0.1, 5)), DataError);
     EXPECT_THROW(static_cast<void>(factors_of(std::array{kNaN}, 0.1, 5)), DataError);
     EXPECT_THROW(static_cast<void>(factors_of(std::array{-0.1}, 0.1, 5)), DataError);

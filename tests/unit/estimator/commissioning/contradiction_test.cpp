@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "estimator/filter/angles.hpp"
+#include "tests/plant/recording.hpp"
 #include "tests/plant/simulation.hpp"
 
 namespace vibrig::estimator::commissioning {
@@ -60,7 +61,9 @@ Contradiction found(const Settings& settings, std::size_t positions,
         });
     const Result result = identification.result();
     EXPECT_THAT(identification.means(), SizeIs(result.dwells.size()));
-    return contradiction_of(settings, result.dwells, identification.means());
+    auto of = contradiction_of(settings, result.dwells, identification.means());
+    EXPECT_EQ(first_contradiction(settings, result.dwells, identification.means()), of.first);
+    return of;
 }
 
 TEST(Contradiction, IsNotFoundWhereTheConfigurationIsTheRigs) {
@@ -147,6 +150,14 @@ TEST(Contradiction, NamesTheUnitOfTheAnglesAndOfTheTime) {
         }
     });
     EXPECT_THAT(turns.warnings.back(), HasSubstr("alpha_deg, beta_deg, gamma_deg: in radians"));
+    // OR those of one gimbal
+    const auto of = [](std::size_t k) {
+        return found({}, 28, {}, [k](std::size_t, Measurement& m) {
+            m.angle_rad[k] = std::remainder(m.angle_rad[k], 2 * kPi) * kRadPerDeg;
+        });
+    };
+    EXPECT_THAT(of(0).warnings.back(), HasSubstr("first: alpha_deg: in radians"));
+    EXPECT_THAT(of(2).warnings.back(), HasSubstr("first: gamma_deg: in radians"));
     // OR times twice as long, or half
     const auto twice = found({}, 28, {}, [](std::size_t, Measurement& m) { m.time_s *= 2; });
     EXPECT_THAT(twice.warnings.back(), HasSubstr("time_s: it is in units of 0.5 s"));

@@ -115,8 +115,8 @@ TEST(SpectrumAcceptance, CampaignsAtOneFrequencyAreWrongAndSayThatItIsNotCovered
 
 /// False alarms over flat rigs, and what the prediction costs there.
 void expect_flat(unsigned campaigns) {
-    unsigned alarms = 0, named = 0;
-    double sum = 0, of_noise = 0;
+    unsigned alarms = 0, named = 0, unfit = 0;
+    double sum = 0, of_noise = 0, fit = 0;
     Settings noise = undeclared();
     noise.drift.model = uncertainty::BiasModel::constant;
     for (unsigned seed = 1; seed <= campaigns; ++seed) {
@@ -125,17 +125,22 @@ void expect_flat(unsigned campaigns) {
         alarms += found.flat.alarm ? 1U : 0U;
         for (const Mixture& gyro : found.gyros) named += gyro.named() ? 1U : 0U;
         EXPECT_EQ(found.flat.degrees, 108);
+        EXPECT_EQ(found.fit.degrees, 3 * (63 - 4 - 6 * 7));
+        unfit += found.fit.p < kAlarm ? 1U : 0U;
+        fit += found.fit.chi_square;
         sum += found.flat.chi_square;
     }
     const double n = campaigns;
     std::printf("flat rigs: mean of T %.1f, by noise alone %.1f, of 108; %u alarms\n", sum / n,
                 of_noise / n, alarms);
     EXPECT_NEAR(of_noise / n, 108, 4 * std::sqrt(216 / n));
+    EXPECT_NEAR(fit / n, 51, 4 * std::sqrt(102 / n));
     // Scatter that the rates do not exclude takes 8 %, slow drift 2 % (the same rates: little of
     // the spread of T is left in the ratio).
     EXPECT_NEAR(sum / of_noise, 0.91, 0.04 * std::sqrt(30 / n));
     // One of 30 at most.
     EXPECT_LE(alarms, at_most(campaigns, kAlarm));
+    EXPECT_LE(unfit, at_most(campaigns, kAlarm));
     EXPECT_EQ(named, 0U);
 }
 TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(20); }

@@ -91,10 +91,34 @@ TEST(Sampling, WholeFrequenciesThatAreClosedAreThePublishedOnes) {
                                             64, 70, 72, 80, 88, 90, 96, 100, 104, 110, 112, 120}));
     EXPECT_EQ(closed(100), (std::vector<int>{20, 25, 40, 50, 60, 75, 80, 100, 120}));
     EXPECT_TRUE(closed(1000).empty());
-    EXPECT_NEAR(nearest_free(60, 40, 10), 60.2, 1e-9);
+    EXPECT_NEAR(nearest_free(60, 40, 10).value_or(0), 60.2, 1e-9);
     for (const double hz : {15.1, 25.1, 35.1, 45.1, 65.1, 85.1, 125.1})
         EXPECT_FALSE(forbidden(hz, 40, 10, kHarmonicsPlanned)) << hz;
     EXPECT_TRUE(forbidden(15, 40, 10, kHarmonicsPlanned));
+}
+
+TEST(Sampling, WhatIsOfferedIsFreeWhereAnythingIs) {
+    for (const double sample_hz : {8.0, 10.0, 12.5, 40.0, 1000.0}) {
+        for (const double window_s : {2.0, 3.0, 5.0, 10.0}) {
+            // GIVEN a rate and a window that leave something free, or nothing
+            bool any = false;
+            for (int k = 1; k <= 10 * sample_hz; ++k)
+                any = any || !forbidden(k * 0.1, sample_hz, window_s);
+            for (const double hz : {15.0, 15.3, 16.0, 60.0}) {
+                // WHEN the nearest free frequency is asked for
+                const auto free = nearest_free(hz, sample_hz, window_s);
+                // THEN it is one, or there is none
+                ASSERT_EQ(free.has_value(), any) << sample_hz << " Hz, " << window_s << " s";
+                if (free) {
+                    EXPECT_FALSE(forbidden(*free, sample_hz, window_s)) << *free;
+                }
+            }
+        }
+    }
+    // AND a window in which eight harmonics find no room has a frequency of which five do
+    EXPECT_FALSE(nearest_free(15.3, 8, 3));
+    EXPECT_NE(nearest_free_words(15.3, 8, 3).find("none is free"), std::string::npos);
+    EXPECT_NEAR(nearest_free(16, 8, 4).value_or(0), 17, 1e-9);
 }
 
 TEST(Sampling, SlowSamplesAreIndependentAndFastOnesKnowEverything) {

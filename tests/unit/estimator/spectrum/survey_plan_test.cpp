@@ -76,6 +76,15 @@ TEST(SurveyPlan, FrequenciesAreMovedOffWhatSamplingForbids) {
         EXPECT_FALSE(lines[k].limited);
     }
     EXPECT_NEAR(survey_lines({60}, 6, kForty, hard_mount(), {})[0].hz, 60.2, 1e-9);
+    // AND where it forbids all nothing is planned
+    try {
+        static_cast<void>(survey_lines({15.3}, 6, {8, 3}, hard_mount(), {}));
+        ADD_FAILURE() << "planned";
+    } catch (const PlanError& error) {
+        EXPECT_NE(std::string(error.what()).find("found 15.3 Hz, expected another: none is free"),
+                  std::string::npos)
+            << error.what();
+    }
 }
 
 TEST(SurveyPlan, LevelsAreWhatTheTableAndThePadsLeave) {

@@ -157,6 +157,55 @@ TEST_F(Acceptance, SoakOfGeometryRows) {
         {.levels = "V", .bias = kAll, .rms = kAll, .combined = 1.3}, declared);
 }
 
+/// The rows that have to be declared, at their size: bias in u, 0.3 more than the table's is let
+/// pass.
+TEST_F(Acceptance, SoakOfRowsDeclaredAtTheirSize) {
+    const auto row = [](const std::string& what, double bias_u,
+                        const std::function<void(plant::Truth&)>& off,
+                        const std::function<void(Inputs&)>& declare) {
+        Settings settings;
+        declare(settings.uncertainty);
+        expect(what + ", declared", off,
+               {.levels = "V", .bias = kAll, .rms = kAll, .combined = bias_u + 0.3}, settings);
+    };
+    row(
+        "latitude 0.6 arcmin", 0.6, [](plant::Truth& t) { t.latitude_deg += 0.01; },
+        [](Inputs& in) { in.latitude_arcsec.u = 36; });
+    row(
+        "azimuth 1 arcmin", 0.6, [](plant::Truth& t) { t.azimuth_deg = 1.0 / 60; },
+        [](Inputs& in) { in.azimuth_arcsec.u = 60; });
+    row(
+        "clock 1e-4", 0.4, [](plant::Truth& t) { t.time_base = 1e-4; },
+        [](Inputs& in) { in.time_base.u = 1e-4; });
+    row(
+        "encoder zero 60 arcsec", 0.5, [](plant::Truth& t) { t.encoder_zero_deg = each(1.0 / 60); },
+        [](Inputs& in) { in.encoder_zero_arcsec.fill({60}); });
+    row(
+        "non-orthogonality 60 arcsec", 0.7,
+        [](plant::Truth& t) {
+            t.non_orthogonality_arcsec = {60, 60};
+        },
+        [](Inputs& in) { in.non_orthogonality_arcsec.fill({60}); });
+    row(
+        "resolver 1 per turn 20 arcsec", 0.4,
+        [](plant::Truth& t) { t.harmonic_1_arcsec = each(20); },
+        [](Inputs& in) { in.resolver_harmonics[0].arcsec = 20; });
+    row(
+        "resolver 2 per turn 20 arcsec", 0.5,
+        [](plant::Truth& t) { t.harmonic_2_arcsec = each(20); },
+        [](Inputs& in) { in.resolver_harmonics[1].arcsec = 20; });
+    row(
+        "resolver 16 per turn 10 arcsec", 1.4,
+        [](plant::Truth& t) { t.harmonic_16_arcsec = each(10); },
+        [](Inputs& in) { in.resolver_harmonics[2].arcsec = 10; });
+    row(
+        "accelerometer zero 5 mg", 1.4, [](plant::Truth& t) { t.zero_g = each(5e-3); },
+        [](Inputs& in) { in.accelerometer_zero_g.fill({5e-3}); });
+    row(
+        "gain 0.99 at f", 0.8, [](plant::Truth& t) { t.vibration_gain = 0.99; },
+        [](Inputs& in) { in.accelerometer_gain.u = 0.01; });
+}
+
 TEST_F(Acceptance, SoakOfAccelerometerRows) {
     const auto gain = [](double by) { return [by](plant::Truth& t) { t.vibration_gain = by; }; };
     expect("gain 0.95 at f", gain(0.95), {"V", 7.2, kAll});

@@ -257,8 +257,10 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal("allan ok.txt --tau0 nan", {"--tau0"});
     expect_refusal("allan ok.txt --tau0 1 --taus 1,x", {"--taus", "\"x\""});
     expect_refusal("allan ok.txt --tau0 1 --taus 1.5", {"1.5 s", "multiple"});
+    expect_refusal("allan ok.txt --tau0 1 --taus 1,2,1", {"--taus: 1 s found twice"});
+    expect_refusal("allan ok.txt --tau0 1 --taus 1,2,", {"--taus: \"\" found"});
     expect_refusal("allan ok.txt --tau0 1 --taus 60", {"60 s", "at most 50 s"});
-    expect_refusal("allan ok.txt --tau0 1 --type avar", {"avar", "oadev"});
+    expect_refusal("allan ok.txt --tau0 1 --type avar", {"--type: ", "avar", "oadev"});
     expect_refusal("allan ok.txt --tau0 1 --unit mph", {"mph", "deg/h"});
     expect_refusal("allan ok.txt --tau0 1 --dynamic 500", {"500 samples", "100"});
     expect_refusal("allan ok.txt --tau0 1 --dynamic 5", {"at least 9"});
@@ -266,15 +268,15 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal("allan large.txt --tau0 1", {"large.txt: sample 3", "1e+308", "1e+60"});
     const std::string one = "allan ok.txt --tau0 1 ";
     expect_refusal(one + "--taus ''", {"--taus", "nothing", "octave"});
-    expect_refusal(one + "--confidence nan", {"--confidence", "nan", "0.01 to 0.9999"});
+    expect_refusal(one + "--confidence nan", {"--confidence", "nan", "from 0.01 up to 0.9999"});
     for (const std::string tau0 : {"1e300", "1e-300", "inf", "-1"}) {
-        expect_refusal("allan ok.txt --tau0 " + tau0, {"--tau0", tau0, "1e-9 to 1e9"});
+        expect_refusal("allan ok.txt --tau0 " + tau0, {"--tau0", tau0, "from 1e-09 up to 1e+09"});
     }
     const std::string window = one + "--dynamic 20 ";
     expect_refusal(window + "--overlap nan", {"--overlap", "nan"});
     expect_refusal(window + "--alpha nan", {"--alpha", "nan"});
-    expect_refusal(window + "--reference 0,nan,0,0,0", {"--reference", "nan", "zero or above"});
-    expect_refusal(window + "--reference 0,1,-1,0,0", {"--reference", "-1", "zero or above"});
+    expect_refusal(window + "--reference 0,nan,0,0,0", {"--reference", "nan", "from 0 up to"});
+    expect_refusal(window + "--reference 0,1,-1,0,0", {"--reference", "-1", "from 0 up to"});
     expect_refusal(window + "--reference 0,0,0,0,0", {"--reference", "five zeros"});
     expect_refusal(window + "--known-mean nan", {"--known-mean", "nan"});
     expect_refusal(window + "--mean known-mean", {"--mean", "without --known-mean"});

@@ -232,7 +232,7 @@ TEST_F(CalibrateCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"plan --turntable --spheres 2,1", "--spheres: found 1"},
           Case{"plan --turntable --spheres 0,1", "--spheres"},
           Case{"plan --turntable --spheres 1,nan", "--spheres"},
-          Case{"plan --turntable --runs 9", "9 runs for 10 coefficients"},
+          Case{"plan --turntable --runs 9", "--runs: found 9, expected 10 at least"},
           Case{"plan --turntable --spheres 1,2,3 --allocation both", "--allocation: found both"},
           Case{"plan --turntable --levels 0,6", "--levels"},
           Case{"plan --turntable --outer 0,6", "--outer"},

@@ -140,7 +140,9 @@ TEST_F(LevelCommand, TimesOfManyStartsAreCountedAsTheirBoundIs) {
 }
 
 TEST_F(LevelCommand, RefusesBadInput) {
-    expect_refusal("level design --damping 1.5", "damping ratio xi: 1.5, expected between 0 and 1");
+    expect_refusal("level design --damping 1.5", "--damping: found 1.5, expected");
+    expect_refusal("level design --residual 1", "--residual: found 1, expected");
+    expect_refusal("level design --residual 0", "--residual: found 0, expected");
     expect_refusal("level design --settling 60 --period 1",
                    "sample period 1 s is too long for a 60 s levelling: at most 0.57 s");
     expect_refusal("level design --gains 0.0264,10,0.904", "K2 must be above 33.24");

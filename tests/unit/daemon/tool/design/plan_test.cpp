@@ -242,7 +242,7 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
         const char* words;
     };
     for (const Case& c :
-         {Case{"--runs 9", "9 runs for 10 coefficients: 10 are needed"},
+         {Case{"--runs 9", "--runs: found 9, expected 10 at least for 10 coefficients"},
           Case{"--levels 0,-1", "--levels: found -1"},
           Case{"--levels 0,nan", "--levels: found"},
           Case{"--positions nan.csv", "nan.csv:3: column beta_deg: found 'nan'"},

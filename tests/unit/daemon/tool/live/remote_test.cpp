@@ -1,14 +1,21 @@
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/write.hpp>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -107,6 +114,41 @@ TEST_F(Tool, SaysWhenNoDaemonRuns) {
         EXPECT_EQ(outcome.code, 2) << command;
         EXPECT_NE(outcome.output.find("no vibrigd answers at " + path + " (is it running?"),
                   std::string::npos)
+            << outcome.output;
+    }
+}
+
+/// Some other server at a socket: it answers one connection after the other with `body`, until it
+/// is stopped.
+void answer(const std::stop_token& stop, const std::string& path, const std::string& body) {
+    using Local = boost::asio::local::stream_protocol;
+    boost::asio::io_context io;
+    Local::acceptor acceptor(io, Local::endpoint(path));
+    while (!stop.stop_requested()) {
+        ::pollfd waiting{acceptor.native_handle(), POLLIN, 0};
+        if (::poll(&waiting, 1, 50) <= 0) continue;
+        Local::socket client = acceptor.accept();
+        std::array<char, 4096> request{};
+        static_cast<void>(client.read_some(boost::asio::buffer(request)));
+        boost::asio::write(client,
+                           boost::asio::buffer("HTTP/1.1 200 OK\r\nContent-Length: " +
+                                               std::to_string(body.size()) + "\r\n\r\n" + body));
+    }
+}
+
+TEST_F(Tool, SaysInOneLineThatAnAnswerIsNone) {
+    const std::array<std::string, 4> commands{"status", "status --json", "watch", "selftest"};
+    const std::jthread other([&](const std::stop_token& stop) {
+        answer(stop, path, "<html>\n<body>Hello</body>\n</html>\n");
+    });
+    while (!std::filesystem::exists(path)) std::this_thread::yield();
+    for (const auto& command : commands) {
+        const Outcome outcome = vibrig(command + at);
+        EXPECT_EQ(outcome.code, 2) << command;
+        EXPECT_EQ(std::ranges::count(outcome.output, '\n'), 1) << outcome.output;
+        EXPECT_NE(outcome.output.find("the daemon's answer: found '<html>"), std::string::npos)
+            << outcome.output;
+        EXPECT_NE(outcome.output.find("expected JSON of vibrig.v1."), std::string::npos)
             << outcome.output;
     }
 }
