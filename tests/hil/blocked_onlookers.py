@@ -152,7 +152,7 @@ def main():
         stops_if_asked_to(checks, programs)
         checks.note(f"{time.monotonic():.0f} s of virtual time")
         return checks.end()
-    return subprocess.run([os.path.join(m.HERE, "run-in-uml"), "-T", "-t", "20000", "--wall", "300", "--",
+    return subprocess.run([os.path.join(m.HERE, "run-in-uml"), "-T", "-t", "20000", "--wall", "1200", "--",
                            os.path.abspath(__file__), programs, "--inside"], stdin=subprocess.DEVNULL, check=False,
                           preexec_fn=lambda: r.die_with_parent(signal.SIGTERM)).returncode
 
