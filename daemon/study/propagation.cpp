@@ -35,6 +35,10 @@ struct PropagationWorker::Model {
         if (found.assessed.over_frequency)
             throw StudyError(recording.folder +
                              ": found dwells at several frequencies, expected one frequency");
+        // That its variances add up would say nothing for a budget that does not hold.
+        for (const auto& reason : found.assessed.verdict.reasons)
+            if (reason.code == "configuration")
+                throw StudyError(recording.folder + ": " + reason.text);
     }
 
     IdentifiedRecording found;

@@ -191,6 +191,12 @@ TEST_F(StudyRecordings, ThatContradictTheirConfigurationAreNotValid) {
     const Folder wrong = plan("wrong", "[identify]\naccelerometer.zero_g = [0.015, 0, 0]\n");
     EXPECT_TRUE(contradicts(wrong));
     EXPECT_EQ(run(wrong)["recordings"][0]["new"]["verdict"], "not valid");
+    // Nor is anything proved of their budget.
+    EXPECT_THAT(complaint([&] {
+                    prove("drawn",
+                          "trials = 10000\n[identify]\naccelerometer.zero_g = [0.015, 0, 0]\n");
+                }),
+                HasSubstr("lab/a: the configuration does not fit the recording: "));
 }
 
 TEST_F(StudyRecordings, AreSelectedBySerialAndDay) {
