@@ -116,12 +116,20 @@ void SeqpacketHub::receive(const Handler& on_frame) {
 }
 
 bool SeqpacketHub::read_client(int fd, const Handler& on_frame) {
+    std::array<canfd_frame, kBatch> frames{};
+    std::array<mmsghdr, kBatch> messages{};
+    std::array<iovec, kBatch> vectors{};
     for (std::size_t i = 0; i < kBatch; ++i) {
-        canfd_frame frame{};
-        const ssize_t size = recv(fd, &frame, sizeof(frame), MSG_TRUNC);
-        if (size < 0) return errno == EAGAIN || errno == EINTR;
-        if (size == 0) return false;
-        const auto bytes = static_cast<std::size_t>(size);
+        vectors[i] = {&frames[i], sizeof(canfd_frame)};
+        messages[i].msg_hdr.msg_iov = &vectors[i];
+        messages[i].msg_hdr.msg_iovlen = 1;
+    }
+    const int count = recvmmsg(fd, messages.data(), kBatch, MSG_TRUNC, nullptr);
+    if (count < 0) return errno == EAGAIN || errno == EINTR;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+        const canfd_frame& frame = frames[i];
+        const std::size_t bytes = messages[i].msg_len;
+        if (bytes == 0) return false;
         if (bytes != CAN_MTU && bytes != CANFD_MTU)
             continue;  // no frame: dropped like noise on a wire
         for (const int other : clients_) {

@@ -132,23 +132,35 @@ bool Simulation::wait_until(std::int64_t deadline_ns) {
     }
 }
 
-Simulation::Wake Simulation::wait(std::optional<std::int64_t> deadline_ns) {
-    // An absolute time: a timeout from now would come later by what it takes from here to the
-    // kernel, and by its slack for timeouts.
+/// At an absolute time: a timeout from now would come later by what it takes from here to the
+/// kernel, and by its slack for timeouts. None: never.
+void Simulation::arm(std::optional<std::int64_t> at_ns) {
     constexpr std::int64_t kSecond = 1'000'000'000;
-    itimerspec timer{};  // off
-    if (deadline_ns) {
-        timer.it_value = {static_cast<time_t>(*deadline_ns / kSecond),
-                          static_cast<long>(*deadline_ns % kSecond)};
+    itimerspec timer{};
+    if (at_ns) {
+        timer.it_value = {static_cast<time_t>(*at_ns / kSecond),
+                          static_cast<long>(*at_ns % kSecond)};
     }
     timerfd_settime(timer_, TFD_TIMER_ABSTIME, &timer, nullptr);
+    armed_ns_ = at_ns;
+}
+
+Simulation::Wake Simulation::wait(std::optional<std::int64_t> deadline_ns) {
+    // One that comes too early is put off then: in lockstep most ticks are over long before.
+    if (deadline_ns && (!armed_ns_ || *armed_ns_ > *deadline_ns)) arm(deadline_ns);
     std::array<pollfd, 4> descriptors{{{bus_.descriptor(), POLLIN, 0},
                                        {stop_, POLLIN, 0},
                                        {command_, POLLIN, 0},
                                        {timer_, POLLIN, 0}}};
     const int ready = poll(descriptors.data(), descriptors.size(), -1);
     if (ready < 0) return Wake::event;
-    if (ready == 1 && descriptors[3].revents != 0) return Wake::deadline;
+    const bool expired = descriptors[3].revents != 0;
+    if (expired && (!deadline_ns || monotonic_ns() < *deadline_ns)) {
+        arm(deadline_ns);
+    } else if (expired && ready == 1) {
+        armed_ns_.reset();
+        return Wake::deadline;
+    }
     if (descriptors[1].revents != 0) return Wake::stop;
     if (descriptors[0].revents != 0) {
         bus_.receive([this](const canfd_frame& frame) { handle(frame); });

@@ -47,6 +47,7 @@ class Simulation {
     [[nodiscard]] bool wait_while_held();
     [[nodiscard]] bool wait_for_acknowledgement();
     [[nodiscard]] bool wait_until(std::int64_t deadline_ns);
+    void arm(std::optional<std::int64_t> at_ns);
     Wake wait(std::optional<std::int64_t> deadline_ns);
     void handle(const canfd_frame& frame);
 
@@ -58,6 +59,7 @@ class Simulation {
     int command_;
     std::function<bool()> on_commands_;
     int timer_;
+    std::optional<std::int64_t> armed_ns_;
     std::vector<can_frame> tick_frames_;
     std::int64_t time_us_ = 0;
     std::optional<std::int64_t> acknowledged_us_;
