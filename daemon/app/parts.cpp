@@ -104,9 +104,11 @@ rt::Acquisition::Wiring wiring(Parts& parts) {
         to.recorder_samples = &parts.recorder->samples();
     }
     if (parts.pre_trip) to.pre_trip = &parts.pre_trip->samples();
+    to.to_estimator = &parts.estimator_stage.hand_over();
     if (parts.in_real_time())
-        to.to_estimator = &parts.estimator_stage.time_by(
-            parts.clock, parts.configuration.assembler.sample_period);
+        parts.estimator_stage.time_by(parts.clock, parts.configuration.assembler.sample_period);
+    else
+        parts.estimator_stage.gather();
     return to;
 }
 

@@ -18,6 +18,7 @@ constexpr Time kTimerPeriod = 50 * drivers::kMillisecond;
 // Of what is shown while no sample is complete. When frames end in the midst of one, the timer
 // shows the last of them.
 constexpr Time kShowPeriod = drivers::kMillisecond;
+constexpr std::uint64_t kGathered = 1024;  // samples that a stage which wants none may be left
 constexpr Time kFaultPeriod = 200 * drivers::kMillisecond;  // a system call each time
 }  // namespace
 
@@ -155,12 +156,20 @@ void Acquisition::push_batch() noexcept {
     // First the recorder's: when a dwell is reported done its samples are there.
     if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
     to_.estimator_ring.push_n({batch_.data(), batched_});
-    if (to_.to_estimator != nullptr) to_.to_estimator->given(clock_.now(), cpu_of_this_thread());
-    to_.estimator.notify();
+    tell_estimator(batch_[batched_ - 1].time);
     if (to_.pre_trip != nullptr) to_.pre_trip->push_n({batch_.data(), batched_});
     shown_.samples_offered += batched_;
     shown_.sample = batch_[batched_ - 1];
     batched_ = 0;
+}
+
+void Acquisition::tell_estimator(Time newest) noexcept {
+    if (to_.to_estimator != nullptr) {
+        const auto ring = to_.estimator_ring.counts();
+        if (!to_.to_estimator->wants(newest) && ring.pushed - ring.popped < kGathered) return;
+        to_.to_estimator->given(clock_.now(), cpu_of_this_thread());
+    }
+    to_.estimator.notify();
 }
 
 bool Acquisition::platform_changed() const noexcept {

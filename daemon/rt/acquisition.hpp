@@ -58,7 +58,7 @@ class Acquisition {
         Ring<FrameRecord>* recorder_frames = nullptr;
         Ring<drivers::Sample>* recorder_samples = nullptr;
         Ring<drivers::Sample>* pre_trip = nullptr;  ///< what led to a trip; null: nobody keeps it
-        HandOver* to_estimator = nullptr;           ///< null: its lateness does not count
+        HandOver* to_estimator = nullptr;           ///< null: it is told of each sample
         RestMonitor* rest = nullptr;                ///< null: nobody asks
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
@@ -82,6 +82,7 @@ class Acquisition {
     void on_tick(const RigTimeLink::Tick& tick) noexcept;
     void feed(const drivers::ReceivedFrame& frame) noexcept;
     void push_batch() noexcept;
+    void tell_estimator(drivers::Time newest) noexcept;
     void hand_on() noexcept;
     [[nodiscard]] bool platform_changed() const noexcept;
     void count_latency(drivers::Time now) noexcept;

@@ -1,5 +1,7 @@
 #include "daemon/rt/estimator_stage.hpp"
 
+#include <algorithm>
+
 namespace vibrig::rt {
 
 using drivers::Time;
@@ -29,10 +31,17 @@ void EstimatorStage::run() noexcept {
 void EstimatorStage::work() noexcept {
     const Time since = handed_over_.taken();
     orders_.consume([this](const DwellOrder& order) { take_order(order); });
-    while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
-    }
+    take_samples();
     if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
     if (shown_.sample_time - published_at_ >= kPublishPeriod) publish(feed_.begun());
+    if (gathers_)
+        handed_over_.want(
+            std::min(ordered_ ? current_.to : drivers::kNever, published_at_ + kPublishPeriod));
+}
+
+void EstimatorStage::take_samples() noexcept {
+    while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
+    }
 }
 
 void EstimatorStage::follow() noexcept {
@@ -47,10 +56,9 @@ void EstimatorStage::stop() noexcept {
     self_.notify();
 }
 
-HandOver& EstimatorStage::time_by(const drivers::Clock& clock, Time bound) noexcept {
+void EstimatorStage::time_by(const drivers::Clock& clock, Time bound) noexcept {
     clock_ = &clock;
     shown_.lateness.bound = bound;
-    return handed_over_;
 }
 
 bool EstimatorStage::order(const DwellOrder& order) noexcept {
@@ -68,6 +76,8 @@ bool EstimatorStage::take_block(BlockRecord& block) noexcept {
 }
 
 void EstimatorStage::take_order(const DwellOrder& order) noexcept {
+    // What has come before belongs to the dwell that is given up.
+    if (order.cancel) take_samples();
     if (ordered_) finish(true);
     if (order.cancel) return;
     current_ = order;

@@ -48,9 +48,15 @@ class EstimatorStage {
     /// Before run(): what goes into the filter goes there too.
     void feed_to(Ring<Fed>& journal) noexcept { journal_ = &journal; }
 
-    /// Before run(): samples that it is done with later than this count. Who fills the ring tells
-    /// the hand-over.
-    HandOver& time_by(const drivers::Clock& clock, drivers::Time bound) noexcept;
+    /// Whoever fills the ring tells it, and asks it whether to notify.
+    [[nodiscard]] HandOver& hand_over() noexcept { return handed_over_; }
+
+    /// Before run(): samples that it is done with later than this count.
+    void time_by(const drivers::Clock& clock, drivers::Time bound) noexcept;
+
+    /// Before run(): it wants to be told of a sample only where a dwell ends or a display is due.
+    /// What comes out is the same: where the rig waits until all sleep, a run is faster.
+    void gather() noexcept { gathers_ = true; }
 
     /// Control thread only.
     bool order(const DwellOrder& order) noexcept;
@@ -63,6 +69,7 @@ class EstimatorStage {
 
   private:
     void take_order(const DwellOrder& order) noexcept;
+    void take_samples() noexcept;
     void take_sample(const drivers::Sample& sample) noexcept;
     void finish(bool cut_short) noexcept;
     void publish(bool ours) noexcept;
@@ -75,7 +82,7 @@ class EstimatorStage {
     Ring<Fed>* journal_ = nullptr;
     const drivers::Clock* clock_ = nullptr;  ///< null: lateness does not count
     HandOver handed_over_;
-    bool stays_ = false;
+    bool stays_ = false, gathers_ = false;
     int cpu_ = -1;  ///< it keeps to, of stay_by_giver()
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};

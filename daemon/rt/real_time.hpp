@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,14 @@ class HandOver {
     [[nodiscard]] drivers::Time taken() noexcept { return since_.exchange(0); }
     [[nodiscard]] int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
 
+    /// Taker: what is older than `time` may lie in the ring without a notice.
+    void want(drivers::Time time) noexcept { wanted_.store(time); }
+    /// Giver: whether a record of this time is to be told of.
+    [[nodiscard]] bool wants(drivers::Time time) const noexcept { return time >= wanted_.load(); }
+
   private:
     std::atomic<drivers::Time> since_{0};
+    std::atomic<drivers::Time> wanted_{std::numeric_limits<drivers::Time>::min()};  ///< all
     std::atomic<int> cpu_{-1};
 };
 

@@ -166,6 +166,7 @@ void estimate(benchmark::State& state) {
     estimator::Identification identification{estimator::Settings{}};
     rt::EstimatorStage stage(ring, *estimator_waiter, *control, identification);
     stage.feed_to(fed);
+    stage.time_by(clock, kPeriod);
     boost::asio::io_context io(1);
     drivers::CanPortSettings can;
     can.kind = drivers::CanPortSettings::Kind::seqpacket;
@@ -175,7 +176,7 @@ void estimate(benchmark::State& state) {
     settings.sample_period = kPeriod;
     rt::Acquisition acquisition(io, *port, test::rig_dbc(), settings, clock, nullptr,
                                 {ring, *estimator_waiter, *control, interlock, nullptr, nullptr,
-                                 nullptr, nullptr, &stage.time_by(clock, kPeriod)});
+                                 nullptr, nullptr, &stage.hand_over()});
     acquisition.start([](drivers::PortState, const char*) {});
     rt::DwellOrder order;
     order.from = clock.now();

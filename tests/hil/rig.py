@@ -381,8 +381,9 @@ def balances(status):
     if status["clock"] == "real":   # the rig's clock never rests: one sample more is on its way, and time has frames
         rows += [("CAN port to assembler", n(can["delivered"]), n(assembler["received"])),
                  ("ring", n(ring["pushed"]), n(ring["popped"]))]
-    else:
-        rows += [("ring", True, 0 <= n(ring["pushed"]) - n(ring["popped"]) <= 1)]
+    else:   # there the filter takes what has come when a dwell ends or a display is due, each 0.2 s
+        waiting = n(ring["pushed"]) - n(ring["popped"])
+        rows += [("ring", True, 0 <= waiting <= 2 + 0.2 * status["sample"].get("rate_hz", 0))]
     return rows
 
 

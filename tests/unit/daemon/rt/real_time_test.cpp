@@ -210,7 +210,8 @@ TEST(EstimatorStage, CountsSamplesItIsDoneWithTooLate) {
         Ring<drivers::Sample> ring(16);
         estimator::Identification identification{estimator::Settings{}};
         EstimatorStage stage(ring, *self, *control, identification);
-        HandOver& hand = stage.time_by(clock, 25 * kMillisecond);
+        stage.time_by(clock, 25 * kMillisecond);
+        HandOver& hand = stage.hand_over();
         drivers::Sample sample;
         sample.time = clock.time;
         ASSERT_TRUE(ring.try_push(sample));
@@ -226,6 +227,44 @@ TEST(EstimatorStage, CountsSamplesItIsDoneWithTooLate) {
         EXPECT_EQ(stage.view().lateness.misses, late > 25 * kMillisecond ? 1U : 0U);
         EXPECT_EQ(stage.view().lateness.longest, late);
     }
+}
+
+TEST(EstimatorStage, WhatGathersWantsToBeToldOfTheDwellsEndAndOfDisplays) {
+    // GIVEN a stage that gathers, ordered a dwell from 1 s to 1.35 s
+    StandingClock clock;
+    const auto self = clock.make_waiter(), control = clock.make_waiter();
+    Ring<drivers::Sample> ring(64);
+    estimator::Identification identification{estimator::Settings{}};
+    EstimatorStage stage(ring, *self, *control, identification);
+    const HandOver& hand = stage.hand_over();
+    EXPECT_TRUE(hand.wants(0)) << "who does not gather is told of each";
+    stage.gather();
+    DwellOrder order;
+    order.from = kSecond;
+    order.to = kSecond + 350 * kMillisecond;
+    ASSERT_TRUE(stage.order(order));
+    drivers::Sample sample;
+    for (sample.time = kSecond; sample.time <= order.from + 200 * kMillisecond;
+         sample.time += 25 * kMillisecond)
+        ASSERT_TRUE(ring.try_push(sample));
+    stage.work();
+    // THEN what lies before both may wait
+    EXPECT_EQ(stage.view().in_dwell, 9U);
+    EXPECT_FALSE(hand.wants(order.to - 1));
+    EXPECT_TRUE(hand.wants(order.to));
+    // WHEN the dwell is given up, THEN what had come and was not told of is in it, and afterwards
+    // the next display is what it waits for
+    sample.time = order.from + 225 * kMillisecond;
+    ASSERT_TRUE(ring.try_push(sample));
+    DwellOrder cancel;
+    cancel.cancel = true;
+    ASSERT_TRUE(stage.order(cancel));
+    stage.work();
+    DwellDone done;
+    ASSERT_TRUE(stage.take_done(done));
+    EXPECT_EQ(done.summary.samples, 10U);
+    EXPECT_FALSE(hand.wants(order.to));
+    EXPECT_TRUE(hand.wants(sample.time + 200 * kMillisecond));
 }
 
 /// CPUs a thread may run on.
@@ -244,7 +283,8 @@ TEST(EstimatorStage, WorksWhereItIsGivenSamples) {
     Ring<drivers::Sample> ring(16);
     estimator::Identification identification{estimator::Settings{}};
     EstimatorStage stage(ring, *self, *control, identification);
-    HandOver& hand = stage.time_by(clock, kSecond);
+    stage.time_by(clock, kSecond);
+    HandOver& hand = stage.hand_over();
     stage.stay_by_giver();
     std::thread thread([&] { stage.run(); });
     const cpu_set_t at_first = cpus_of(thread.native_handle());
