@@ -1,5 +1,6 @@
 #include "daemon/serve/metrics.hpp"
 
+#include <malloc.h>
 #include <prometheus/text_serializer.h>
 
 #include <cmath>
@@ -163,6 +164,14 @@ void add_real_time(Families& to, const RealTimeStatus& s) {
     to.counter("vibrig_thread_page_faults_total", "Since the thread was set up.", faults);
 }
 
+/// What grows here is kept; what is resident also has the places that something freed has left.
+void add_memory(Families& to) {
+    const auto heap = ::mallinfo2();
+    to.gauge("vibrig_heap_used_bytes",
+             "Memory that the program has asked for and not given back; 0: not known.",
+             static_cast<double>(heap.uordblks + heap.hblkhd));
+}
+
 void add_acquisition(Families& to, const StatusData& s) {
     const auto& can = s.can_counters;
     const auto& a = s.assembler;
@@ -291,6 +300,7 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
     add_values(families, status);
     add_campaign(families, status);
     add_shaker(families, status);
+    add_memory(families);
     add_acquisition(families, status);
     add_estimate(families, status);
     add_interlock(families, status);
