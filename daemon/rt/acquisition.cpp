@@ -165,8 +165,10 @@ void Acquisition::push_batch() noexcept {
 
 void Acquisition::tell_estimator(Time newest) noexcept {
     if (to_.to_estimator != nullptr) {
-        const auto ring = to_.estimator_ring.counts();
-        if (!to_.to_estimator->wants(newest) && ring.pushed - ring.popped < kGathered) return;
+        if (!to_.to_estimator->wants(newest)) {
+            const auto ring = to_.estimator_ring.counts();
+            if (ring.pushed - ring.popped < kGathered) return;
+        }
         to_.to_estimator->given(clock_.now(), cpu_of_this_thread());
     }
     to_.estimator.notify();
