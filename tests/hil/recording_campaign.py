@@ -251,8 +251,8 @@ def played(checks, rig, folder):
               "until grep -q '^ *vcan0 ' /proc/net/can/rcvlist_all; do sleep 0.1; done; "
               f"canplayer -t -I {piece} vcan0=vcan0; wait")
     uml = os.path.join(os.path.dirname(os.path.abspath(__file__)), "run-in-uml")
-    run = subprocess.run([uml, "-t", "60", "--", "sh", "-c", script], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                         timeout=180, preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
+    run = subprocess.run([uml, "-t", "300", "--", "sh", "-c", script], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                         timeout=600, preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
     caught = [line.split()[2] for line in run.stdout.splitlines() if line.startswith("(")]
     checks.check(caught == frames and len(frames) == len(some) - 1, "canplayer plays the log, both directions",
                  f"{len(caught)} of {len(frames)}, exit {run.returncode} {run.stderr[-500:]}")
