@@ -20,8 +20,8 @@ import rig as r  # noqa: E402
 # will need (rows of the filter, curves of the page) is there from its beginning.
 HELD_KB_PER_H = 100
 # The system counts by pages, and a heap that many threads share has places that an answer or a verdict has left and the next one
-# takes again: of each dwell 4 kB, and some 200 kB either way, in the short run 10 of such a rate.
-RESIDENT_KB_PER_H = 250
+# takes again: of each dwell 4.6 kB, 150 kB per hour, and some 200 kB either way, in the short run 10 of such a rate.
+RESIDENT_KB_PER_H = 200
 DWELLS_PER_H = 3600 / 110   # of 100 s, with ramps, settling and slews
 WARM = 140                  # dwells until caches and buffers have their size
 TOGETHER = 80               # dwells of which the least is taken: what a verdict has while it is made is not kept
