@@ -42,20 +42,27 @@ VectorXd prior_of(const VectorXd& base_sigma, std::size_t resonances, double ela
 }
 
 /// Normal equations of whitened columns with a prior about zero.
+struct Normal {
+    MatrixXd square;       ///< of the columns
+    VectorXd right;        ///< with the rates
+    double rate_square{};  ///< of the rates
+};
 struct Solved {
     VectorXd x;
     MatrixXd covariance;
     double log_evidence = 0;  ///< less what is common to all models of the same rates
 };
-Solved solve(const MatrixXd& normal, const VectorXd& right, double square, const VectorXd& sigma) {
-    MatrixXd information = normal;
+/// With its covariance, or without: the evidence alone, over a plane, needs none.
+template <bool kWithCovariance = true>
+Solved solve(const Normal& normal, const VectorXd& sigma) {
+    MatrixXd information = normal.square;
     information.diagonal().array() += sigma.array().square().inverse();
     const auto factor = Cholesky::or_nan(information);
     Solved out;
-    out.x = factor.solve(right);
-    out.covariance = factor.inverse();
-    out.log_evidence =
-        -0.5 * factor.log_det() - sigma.array().log().sum() - 0.5 * (square - right.dot(out.x));
+    out.x = factor.solve(normal.right);
+    if constexpr (kWithCovariance) out.covariance = factor.inverse();
+    out.log_evidence = -0.5 * factor.log_det() - sigma.array().log().sum() -
+                       0.5 * (normal.rate_square - normal.right.dot(out.x));
     return out;
 }
 
@@ -79,7 +86,7 @@ class Likelihood {
             rate_.segment(n, swept.size()) = swept.rate();
             n += swept.size();
         }
-        base_normal_ = linear_algebra::gram(base_);
+        flat_ = {linear_algebra::gram(base_), base_.transpose() * rate_, rate_.squaredNorm()};
     }
 
     struct Both {
@@ -91,20 +98,13 @@ class Likelihood {
         }
     };
     /// With the prior's density in ln hz and ln damping.
+    template <bool kWithCovariance = true>
     [[nodiscard]] Both both(const Point& p) const {
-        const MatrixXd elastic = whitened_elastic(at(p));
-        MatrixXd normal(kColumns, kColumns);
-        normal.topLeftCorner(kBase, kBase) = base_normal_;
-        normal.topRightCorner(kBase, kElastic).noalias() = base_.transpose() * elastic;
-        normal.bottomLeftCorner(kElastic, kBase) =
-            normal.topRightCorner(kBase, kElastic).transpose();
-        normal.bottomRightCorner(kElastic, kElastic).noalias() = elastic.transpose() * elastic;
-        VectorXd right(kColumns);
-        right << base_.transpose() * rate_, elastic.transpose() * rate_;
+        const Normal normal = normal_at(at(p));
         Both out;
         for (std::size_t s = 0; s < kElasticSizes.size(); ++s)
-            out.by_size[s] = solve(normal, right, rate_.squaredNorm(),
-                                   prior_of(problem_.prior_sigma, 1, kElasticSizes[s]));
+            out.by_size[s] =
+                solve<kWithCovariance>(normal, prior_of(problem_.prior_sigma, 1, kElasticSizes[s]));
         const double z = (p[1] - std::log(kDamping)) / kDampingSpread;
         out.log_prior = -std::log(std::log(kHighestResonance / kLowestResonance)) - z * z / 2 -
                         std::log(kDampingSpread * std::sqrt(2 * kPi));
@@ -114,14 +114,22 @@ class Likelihood {
         if (p[0] < std::log(kLowestResonance) || p[0] > std::log(kHighestResonance) ||
             !(std::abs(p[1]) < 20))
             return -1e300;
-        return both(p).total();
+        return both<false>(p).total();
     }
-    [[nodiscard]] Solved flat() const {
-        return solve(base_normal_, base_.transpose() * rate_, rate_.squaredNorm(),
-                     problem_.prior_sigma);
-    }
+    [[nodiscard]] Solved flat() const { return solve(flat_, problem_.prior_sigma); }
 
   private:
+    [[nodiscard]] Normal normal_at(const Resonance& of) const {
+        const MatrixXd elastic = whitened_elastic(of);
+        Normal out{MatrixXd(kColumns, kColumns), VectorXd(kColumns), flat_.rate_square};
+        out.square.topLeftCorner(kBase, kBase) = flat_.square;
+        out.square.topRightCorner(kBase, kElastic).noalias() = base_.transpose() * elastic;
+        out.square.bottomLeftCorner(kElastic, kBase) =
+            out.square.topRightCorner(kBase, kElastic).transpose();
+        out.square.bottomRightCorner(kElastic, kElastic).noalias() = elastic.transpose() * elastic;
+        out.right << flat_.right, elastic.transpose() * rate_;
+        return out;
+    }
     [[nodiscard]] MatrixXd whitened_elastic(const Resonance& of) const {
         MatrixXd out(rate_.size(), kElastic);
         Index n = table_.dwells();
@@ -140,7 +148,7 @@ class Likelihood {
     Cholesky factor_;
     MatrixXd base_;
     VectorXd rate_;
-    MatrixXd base_normal_;
+    Normal flat_;  ///< of the base alone
 };
 
 /// Maximum by Nelder and Mead's simplex: no derivatives of a likelihood that is steep far away.
