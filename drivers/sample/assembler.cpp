@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "drivers/sample/frame_plan.hpp"
+#include "drivers/sample/regularity.hpp"
 #include "drivers/sample/sync_clock.hpp"
 
 namespace vibrig::drivers {
@@ -151,6 +152,7 @@ struct SampleAssembler::Impl {
     PlatformStatus platform;
     Time loop_time = 0, fault_time = 0;  ///< of its newest frame
     Time position_time = 0, slewing_time = 0, echo_time = 0;
+    Regularity of_ready, of_speed;
     Time newest_frame = 0;
     Time sync_time = 0, sync_period = 0;  ///< of its newest frame; about how often they come
     AssemblerCounters counters;
@@ -416,6 +418,8 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
             // The others grow old by it; these have no age, as they may be sent on change alone.
             platform.*flag = false;
     }
+    platform.ready = platform.ready && !of_ready.ceased(frame.time);
+    platform.gyros_at_speed = platform.gyros_at_speed && !of_speed.ceased(frame.time);
 }
 
 void SampleAssembler::Impl::take_status(const StatusRow& row, double value, Time time) noexcept {
@@ -444,6 +448,8 @@ void SampleAssembler::Impl::take_status(const StatusRow& row, double value, Time
                       of(names.command_echo, echo_time)});
         return;
     }
+    if (row.flag == &PlatformStatus::ready) of_ready.came(time);
+    if (row.flag == &PlatformStatus::gyros_at_speed) of_speed.came(time);
     if (row.flag == &PlatformStatus::loop_closed) loop_time = time;
     if (row.flag == &PlatformStatus::fault) fault_time = time;
     // Of two that come one right behind the other the worse one counts.

@@ -93,7 +93,9 @@ struct PlatformStatus {
     /// As old as what is older of loop_closed and fault, whatever else comes; 0: not both have come
     /// yet. Where neither is bound: of the newest of the others.
     Time time = 0;
-    bool ready = false;        ///< the platform's own ready flag
+    /// The platform's own ready flag. False, as gyros_at_speed, also where it came each second and
+    /// has ceased.
+    bool ready = false;
     bool loop_closed = false;  ///< stabilisation loop closed
     bool gyros_at_speed = false;
     double temperature_c = 0;  ///< platform temperature, deg C

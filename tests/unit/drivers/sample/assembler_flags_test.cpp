@@ -123,5 +123,52 @@ TEST_F(AssemblerFlags, APlatformThatDoesNotKnowWhetherItIsReadyIsNot) {
     EXPECT_TRUE(p.ready && p.gyros_at_speed);
 }
 
+TEST_F(AssemblerFlags, WhatCameEachSecondAndComesNoMoreIsNotReady) {
+    // GIVEN ready and speed in messages of their own, loop and fault in one that always comes
+    AssemblerSettings settings = rig_settings();
+    settings.bindings.ready = "GyroIncrements.Counter";
+    settings.bindings.gyros_at_speed = "GimbalStatus.Slewing";
+    settings.bindings.slewing = "";
+    make(settings);
+    const PlatformStatus& p = assembler_->platform();
+    Time now = 5 * kSecond;
+    const auto say = [&](bool ready, bool at_speed) {
+        now += kSecond / 2;
+        if (ready) assembler_->feed(frame_of(dbc_, "GyroIncrements", now, {{"Counter", 1}}));
+        if (at_speed) assembler_->feed(frame_of(dbc_, "GimbalStatus", now, {{"Slewing", 1}}));
+        assembler_->feed(frame_of(dbc_, "PlatformStatus", now, {{"LoopClosed", 1}}));
+    };
+    for (int n = 0; n < 25; ++n) say(true, true);
+    EXPECT_TRUE(p.ready && p.gyros_at_speed);
+    // WHEN the one ceases THEN it is believed for three seconds, the other goes on
+    for (int n = 0; n < 6; ++n) say(true, false);
+    EXPECT_TRUE(p.ready && p.gyros_at_speed);
+    say(true, false);
+    EXPECT_TRUE(p.ready && !p.gyros_at_speed);
+    for (int n = 0; n < 7; ++n) say(false, true);
+    EXPECT_TRUE(!p.ready && p.gyros_at_speed);
+    EXPECT_TRUE(p.loop_closed);
+    EXPECT_EQ(p.time, now);
+    // AND when it comes again it is as it says
+    say(true, true);
+    EXPECT_TRUE(p.ready && p.gyros_at_speed);
+}
+
+TEST_F(AssemblerFlags, WhatIsSentOnChangeAloneHolds) {
+    AssemblerSettings settings = rig_settings();
+    settings.bindings.ready = "GyroIncrements.Counter";
+    make(settings);
+    const PlatformStatus& p = assembler_->platform();
+    // GIVEN that it comes now and then, also several times within a second
+    Time now = 5 * kSecond;
+    for (int n = 0; n < 60; ++n) {
+        now += n % 10 == 0 ? 2 * kSecond : kSecond / 10;
+        assembler_->feed(frame_of(dbc_, "GyroIncrements", now, {{"Counter", 1}}));
+    }
+    for (int n = 0; n < 100; ++n)
+        assembler_->feed(frame_of(dbc_, "PlatformStatus", now += kSecond / 2, {{"LoopClosed", 1}}));
+    EXPECT_TRUE(p.ready);
+}
+
 }  // namespace
 }  // namespace vibrig::test
