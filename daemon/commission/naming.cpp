@@ -71,6 +71,20 @@ std::string outvoted_latitude(const room::EarthFinding& earth, double stated_deg
         stated_deg, earth.rate.neu[2] > 0 ? "northern" : "southern", heard);
 }
 
+/// Where too few agree: who was not heard, or said nothing, and how to ask.
+std::string would_tell(const room::EarthFinding& earth) {
+    if (!earth.why.starts_with("accelerometers inverted")) return {};
+    std::string left, first;
+    for (const std::string name : {"latitude", "compass", "drawing", "sense"}) {
+        const auto heard = std::ranges::find(earth.witnesses, name, &room::Witness::name);
+        if (heard != earth.witnesses.end() && std::abs(heard->ln_odds) >= kSaysNothing) continue;
+        if (left.empty()) first = name;
+        left += (left.empty() ? "" : ", ") + name;
+    }
+    if (left.empty()) return {};
+    return fmt::format("; what would tell: {} (vibrig commission --ask {})", left, first);
+}
+
 /// Keys that the witnesses stand for: those that are outvoted, or where too few agree all that
 /// parity stands on.
 std::vector<std::string> earth_suspects(const room::EarthFinding& earth) {
@@ -389,7 +403,7 @@ void Procedure::decide() {
         if (witness.name == "latitude" && std::abs(witness.ln_odds) < kSaysNothing)
             tell("   too near the equator: the hemisphere is " + by_ + "'s word alone");
     if (earth.verdict != Verdict::decided)
-        return conclude(Verdict::undecided, earth.why, earth_suspects(earth));
+        return conclude(Verdict::undecided, earth.why + would_tell(earth), earth_suspects(earth));
     if (const auto wrong = outvoted_latitude(earth, *said_of_rig_.latitude_deg); !wrong.empty())
         return conclude(Verdict::undecided, wrong, earth_suspects(earth));
     earth_ = std::move(earth);

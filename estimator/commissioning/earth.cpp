@@ -210,11 +210,9 @@ EarthFinding find_by_earth(const Description& description, const std::vector<Fre
         if (witness.ln_odds * sum < 0)
             finding.outvoted.push_back(witness.name + " contradicts the others");
     if (sum < 0) {
-        finding.description = other_parity(description);
-        if (rate) {
-            finding.rate.neu[1] = -finding.rate.neu[1];
-            finding.rate.neu[2] = -finding.rate.neu[2];
-        }
+        // Of the other parity another member bears the names that the bus has.
+        finding.description = preferred_of(other_parity(description));
+        if (rate) finding.rate = earth_rate(finding.description, drifts, settings);
     }
     if (rate) finding.why = contradiction(finding.rate, statements);
     finding.verdict = finding.why.empty() ? Verdict::decided : Verdict::undecided;

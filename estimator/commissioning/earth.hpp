@@ -65,7 +65,7 @@ struct Witness {
 struct EarthFinding {
     Verdict verdict = Verdict::undecided;
     std::string why;
-    Description description;  ///< decided: with the right parity
+    Description description;  ///< decided: with the right parity, of that one preferred_of()
     EarthRate rate;           ///< in its axes
     std::vector<Witness> witnesses;
     std::vector<std::string> outvoted;  ///< statements that are wrong
@@ -73,7 +73,7 @@ struct EarthFinding {
 
 /// Decides the parity by what people say against the Earth's rate, and holds both against one
 /// another: no witness alone suffices (docs/commissioning.md, "Earth rate and parity"). Without
-/// drifts drawing and sense must agree.
+/// drifts drawing and sense must agree. The description is one that preferred_of() has given.
 [[nodiscard]] EarthFinding find_by_earth(const Description& description,
                                          const std::vector<FreeDrift>& drifts,
                                          const Statements& statements,

@@ -219,6 +219,9 @@ TEST_F(Resumed, OneWitnessIsAskedAgainAndNothingElseIsMeasured) {
         answers = {{"compass", "-"}, {"drawing", "-"}, {"anticlockwise", "-"}};
         const Json first = run()["result"];
         ASSERT_EQ(first["outcome"], "undecided") << "one witness is none";
+        EXPECT_THAT(first["why"].get<std::string>(),
+                    HasSubstr("; what would tell: compass, drawing, sense (vibrig commission "
+                              "--ask compass)"));
         const auto stops = kept.size();
         die();
         answers.clear();

@@ -105,6 +105,10 @@ void commission(std::uint64_t seed, Tally& tally) {
         return;
     }
     ++tally.decided;
+    // Whichever parity gravity began with: named as the bus names them, as far as that goes.
+    const Description bus_names = preferred_of(earth.description);
+    EXPECT_EQ(earth.description.wiring(), bus_names.wiring());
+    EXPECT_EQ(earth.description.sign, bus_names.sign);
     const bool right = (earth.description.accelerometers.determinant() > 0) == rig.right_handed();
     // Counted about the other end of the outer axis, azimuth + 180.
     const double turned = earth.description.sign[0] == rig.sign[0] ? 0 : 180;
@@ -123,6 +127,31 @@ void commission(std::uint64_t seed, Tally& tally) {
     const double elevation =
         std::abs(std::abs(earth.description.elevation_deg) - std::abs(rig.truth.base_tilt_deg[1]));
     EXPECT_LT(elevation, 0.06);
+}
+
+/// A rig whose axes and accelerometers are what the bus names them.
+TEST(RandomRigs, AsTheBusNamesItIsFoundFromEitherParity) {
+    Description truth;
+    truth.sign = {1, -1, 1};
+    truth.zero_deg = {30, 5, -60};
+    const auto family = family_of(truth);
+    // WHEN the drawing and the sense say so THEN whichever member gravity has found it is that one
+    const Vec3 reading{30, 5, -60};
+    Statements said;
+    said.right_handed = true;
+    said.sense = Statements::Sense{{120, 5, -60}, false};
+    for (const Description& member : family) {
+        for (const bool upper : {true, false}) {
+            said.sense->reading[0] = upper ? 120 : -60;
+            said.sense->grew = -truth.sign[2] * truth.up(said.sense->reading)[2] > 0;
+            const auto found = find_by_earth(preferred_of(member), {}, said);
+            ASSERT_EQ(found.verdict, Verdict::decided) << found.why;
+            EXPECT_EQ(found.description.wiring(), Eigen::Matrix3d::Identity());
+            EXPECT_EQ(found.description.sign, truth.sign);
+            for (int k = 0; k < 3; ++k)
+                EXPECT_NEAR(found.description.angles(reading)[k], 0, 1e-12) << k;
+        }
+    }
 }
 
 TEST(RandomRigs, AreNamedRightOrNotAtAll) {
