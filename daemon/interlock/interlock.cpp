@@ -197,7 +197,8 @@ bool Interlock::table_beyond_limit(const drivers::Sample& sample) noexcept {
 
 void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
     const std::uint64_t before = commanded_.number;
-    static_cast<void>(ramp_.try_read(commanded_));
+    commanded_ = ramp_.read();
+    if (commanded_.random > random_.size()) commanded_.random = 0;
     if (commanded_.number != before) {
         controller_began_ = 0;
         const double hz = commanded_.frequency_hz > 0 ? commanded_.frequency_hz : frequency_hz_;
@@ -206,7 +207,6 @@ void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
         else
             witness_.retune(hz);
         seconds_.retune(hz);
-        if (commanded_.random > random_.size()) commanded_.random = 0;
         if (commanded_.random > 0 && commanded_.target_g > commanded_.start_g) {
             RandomWitness& witness = random_[commanded_.random - 1U];
             if (commanded_.start_g == 0) witness.begin();

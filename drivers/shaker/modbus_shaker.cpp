@@ -113,7 +113,7 @@ void ModbusShaker::hang_up_until(Time time) noexcept {
 }
 
 ShakerReading ModbusShaker::reading() const noexcept {
-    ShakerReading reading = latest_.load();
+    ShakerReading reading = latest_.read();
     // One lost reply and the reconnect after it are lived through; the watchdog waits longer still.
     const Time lifetime = std::max(3 * settings_.poll_period, 2 * settings_.watchdog_period);
     if (clock_.now() - reading.time > lifetime) reading.fresh = reading.valid = false;
@@ -557,7 +557,7 @@ void ModbusShaker::poll(Time now) {
         commanded_.reset();  // reported once
     }
     if (on_judging_) on_judging_(reading);
-    latest_.store(reading);
+    latest_.publish(reading);
     settle(changed.empty() ? "read back" : changed);
     if (on_reading_) on_reading_();
 }

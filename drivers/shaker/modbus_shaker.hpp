@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/base/snapshot.hpp"
 #include "drivers/shaker/modbus_link.hpp"
 #include "drivers/shaker/shaker.hpp"
 #include "drivers/shaker/shaker_image.hpp"
-#include "drivers/shaker/shaker_latest.hpp"
 #include "drivers/shaker/shaker_orders.hpp"
 
 namespace vibrig::drivers {
@@ -132,7 +132,7 @@ class ModbusShaker final : public Shaker {
     ShakerOrders orders_;
     Counts counts_;
     Count beats_;
-    Latest<ShakerReading> latest_;
+    rt::Snapshot<ShakerReading> latest_;
     std::atomic<LinkState> state_{LinkState::absent};
 
     std::function<bool()> may_feed_;

@@ -21,7 +21,7 @@ void ModbusShaker::link_is_new() {
 
 bool ModbusShaker::identity_due() const noexcept {
     return asks_left_ > 0 && polled_ && !commanded_ && !orders_.waiting() &&
-           latest_.load().at_rest();
+           latest_.read().at_rest();
 }
 
 /// A late reply would be taken for the next one: a device that does not answer, or hangs up, costs

@@ -35,7 +35,7 @@ bool ModbusShaker::psd_due() noexcept {
         psd_words_.clear();
     }
     return psd_attempts_left_ > 0 && polled_ && !commanded_ && !orders_.waiting() &&
-           latest_.load().at_rest();
+           latest_.read().at_rest();
 }
 
 /// A late reply would be taken for the next one: a device that does not answer costs its link.

@@ -9,7 +9,6 @@
 #include <atomic>
 #include <ostream>
 
-#include "drivers/shaker/shaker_latest.hpp"
 #include "test_bench.hpp"
 
 namespace vibrig::drivers::test {
@@ -190,28 +189,6 @@ TEST(ShakerWire, SaysWhenDescriptorsAreBeyondSelect) {
         EXPECT_TRUE(bench.reaches(LinkState::running));
     }
     for (const int filler : fillers) ::close(filler);
-}
-
-TEST(Latest, GivesWholeValuesWhileTheyChange) {
-    // GIVEN a value whose parts are always equal, and a writer that changes it all the time
-    struct Value {
-        std::uint64_t a = 0, b = 0, c = 0;
-    };
-    Latest<Value> latest;
-    std::atomic<bool> quit = false;
-    std::thread writer([&] {
-        for (std::uint64_t n = 1; !quit; ++n) latest.store({n, n, n});
-    });
-    std::uint64_t last = 0;
-    for (int i = 0; i < 20000; ++i) {
-        const Value value = latest.load();
-        ASSERT_EQ(value.a, value.b);
-        ASSERT_EQ(value.a, value.c);
-        ASSERT_GE(value.a, last);
-        last = value.a;
-    }
-    quit = true;
-    writer.join();
 }
 
 }  // namespace
