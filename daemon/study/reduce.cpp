@@ -166,7 +166,7 @@ Json Reduction::result(std::uint64_t missing) {
     const bool campaigns = folder_.study.kind == "campaigns";
     Json out{{"study", folder_.study.name}, {"kind", folder_.study.kind}, {"id", folder_.id_text}};
     if (folder_.study.kind != "recordings") out["seed"] = folder_.study.seed;
-    if (campaigns) out["runs"] = folder_.study.runs;
+    if (campaigns) out.update({{"runs", folder_.study.runs}, {"simulated", true}});
     out.update({{"tasks", folder_.tasks()},
                 {"done", done_},
                 {"failed", failed_},
