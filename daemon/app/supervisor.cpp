@@ -32,29 +32,19 @@ void Supervisor::look(const std::string& guard_lacks) {
 void Supervisor::check_balance(Time now) {
     if (now - balance_checked_ < drivers::kSecond) return;
     balance_checked_ = now;
-    const auto a = acquisition_.view();
-    const auto e = estimator_stage_.view();
-    std::string found;
-    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
-        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
-    };
-    equal("frames received", a.port.received,
-          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
-    equal("frames delivered", a.port.delivered,
-          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
-    equal("frames for samples", a.assembler.received,
-          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
-              a.assembler.wrong_length);
-    equal("samples offered", a.samples_offered, a.assembler.samples);
-    equal("samples taken", e.taken, e.in_dwell + e.idle);
-    if (log_queue_ != nullptr) {
-        const auto lines = log_queue_->counts();
-        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
-    }
+    Counted counted;
+    counted.shaker = shaker_->counters();
+    counted.acquisition = acquisition_.view();
+    counted.estimator = estimator_stage_.view();
+    counted.ring = estimator_stage_.ring();
+    if (recorder_) counted.recorder = recorder_->samples().counts();
+    if (journal_) counted.journal = journal_->status();
+    if (log_queue_ != nullptr) counted.log = log_queue_->counts();
+    const std::string found = balance_.look(counted);
     if (!found.empty() && imbalance_.empty())
         log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
     imbalance_ = found;
-    tell_contradiction(a.assembler, now);
+    tell_contradiction(counted.acquisition.assembler, now);
 }
 
 void Supervisor::tell_contradiction(const drivers::AssemblerCounters& counters, Time now) {

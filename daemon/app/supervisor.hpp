@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/app/balance.hpp"
 #include "daemon/app/parts.hpp"
 #include "daemon/journal/latches.hpp"
 
@@ -22,7 +23,7 @@ class Supervisor {
     void beat(drivers::Time now) noexcept { control_beat_.store(now); }
     /// Tells what has changed since the last time; `guard_lacks`: why vibrig-guard does not watch.
     void look(const std::string& guard_lacks);
-    /// Once a second: received = handled + dropped (by reason) + waiting.
+    /// Once a second; see Balance.
     void check_balance(drivers::Time now);
     /// A row of the table alarms.
     [[nodiscard]] bool alarm_raised() const noexcept {
@@ -70,6 +71,7 @@ class Supervisor {
     drivers::ControllerState controller_logged_ = drivers::ControllerState::active;
     bool watchdog_was_changed_ = false, journal_was_running_ = true, recorder_was_stuck_ = false,
          log_was_blocked_ = false;
+    Balance balance_;
     std::string imbalance_;
     drivers::Time balance_checked_ = 0, contradiction_told_ = 0;
     std::uint64_t contradicting_ = 0;

@@ -18,6 +18,7 @@ struct JournalStatus {
     bool verified = false;      ///< it is what was written into it, as looked at since the start
     double verified_part = 0;   ///< so much of it
     std::string not_watched;    ///< why it cannot be looked at just now; empty: it can
+    std::uint64_t waiting = 0;  ///< entries that the disk does not have
 };
 
 /// Recording of the present campaign, or of the last one.

@@ -135,7 +135,9 @@ std::uint64_t Journal::command(const CommandRequest& request, const CommandReply
 
 JournalStatus Journal::status() const {
     const std::lock_guard lock(mutex_);
-    return status_;
+    JournalStatus status = status_;
+    status.waiting = waiting_.size() + at_work_;
+    return status;
 }
 
 void Journal::loop() {
@@ -149,6 +151,7 @@ void Journal::loop() {
             changed_.wait_for(
                 lock, at_work.empty() ? kPeriod : std::chrono::milliseconds(kRetry),
                 [this, &at_work] { return stop_ || (at_work.empty() && !waiting_.empty()); });
+            at_work_ += waiting_.size();
             taken.swap(waiting_);
             last = stop_;
         }
@@ -247,6 +250,7 @@ bool Journal::write(const std::deque<Entry>& entries) {
         if (why.empty()) {
             // With the head that goes with it: who closes a recording asks for both.
             status_.written += entries.size();
+            at_work_ -= entries.size();
             status_.head = file_.head().line();
             status_.proof_head = proof_head_;
             status_.entries = static_cast<std::uint64_t>(file_.newest().entry);

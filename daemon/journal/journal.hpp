@@ -209,6 +209,7 @@ class Journal {
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<Entry> waiting_;
+    std::size_t at_work_ = 0;  ///< entries that its thread has and the disk has not
     std::vector<std::string> found_;
     JournalStatus status_;
     bool stop_ = false;
