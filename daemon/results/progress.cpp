@@ -2,7 +2,11 @@
 
 #include <unistd.h>
 
+#include <cmath>
+#include <condition_variable>
 #include <cstdio>
+#include <mutex>
+#include <stop_token>
 #include <utility>
 
 namespace vibrig::tool {
@@ -43,5 +47,23 @@ void Progress::show(const std::string& line) {
     std::fprintf(stderr, "\r%s\033[K", line.c_str());
     std::fflush(stderr);
 }
+
+Working::Working(std::string what) {
+    if (isatty(STDERR_FILENO) != 1) return;
+    thread_ = std::jthread([what = std::move(what)](const std::stop_token& over) {
+        const auto began = std::chrono::steady_clock::now();
+        Progress progress;
+        std::mutex mutex;
+        std::condition_variable_any changed;
+        std::unique_lock lock(mutex);
+        while (!changed.wait_for(lock, over, kPatience, [] { return false; }) &&
+               !over.stop_requested()) {
+            const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - began;
+            progress.show(what + ", " + std::to_string(std::lround(passed.count())) + " s");
+        }
+    });
+}
+
+Working::~Working() = default;
 
 }  // namespace vibrig::tool

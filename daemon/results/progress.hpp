@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <string>
+#include <thread>
 
 namespace vibrig::tool {
 
@@ -27,6 +28,18 @@ class Progress {
     bool terminal_;
     bool shown_ = false;
     Clock::time_point next_;
+};
+
+/// The same for work whose steps nobody counts: how long it has taken so far.
+class Working {
+  public:
+    explicit Working(std::string what);
+    ~Working();  ///< clears the line
+    Working(const Working&) = delete;
+    Working& operator=(const Working&) = delete;
+
+  private:
+    std::jthread thread_;  ///< none without a terminal
 };
 
 }  // namespace vibrig::tool

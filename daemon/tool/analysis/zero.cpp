@@ -246,11 +246,13 @@ int run_simulate(const Options& options) {
     if (options.both_ways) ways.push_back({2, true});
     if (options.second_axis) ways.insert(ways.end(), {{1, false}, {1, true}});
     std::vector<zeros::Calibration> runs;
+    std::optional<Working> working("simulating");
     for (const zeros::Way& way : ways) {
         s.upright = way.upright;
         s.inverted = way.down;
         runs.push_back(zeros::simulate(s, errors, options.period_s, options.seed + runs.size()));
     }
+    working.reset();
     return report(options, runs);
 }
 

@@ -60,8 +60,7 @@ int run(Options& options, bool blocks) {
     PlanStudy result;
     check(options, blocks);
     {
-        Progress progress("planning");
-        progress.show(0, 1);
+        const Working working("planning");
         result =
             options.request.survey.asked() ? survey_study(options.request) : study(options.request);
     }

@@ -161,8 +161,7 @@ int export_campaign(const ExportOptions& options) {
         throw std::runtime_error("--json: found it beside --output -, expected a file to write");
     record::Campaign campaign;
     {
-        Progress progress("reading " + argument);
-        progress.show(0, 1);
+        const Working working("reading " + argument);
         campaign = read_named_campaign(argument);
     }
     if (path.empty()) {
@@ -173,6 +172,7 @@ int export_campaign(const ExportOptions& options) {
     }
     proto::check_output(path);
     bool whole = true;
+    std::optional<Working> working("exporting " + campaign.head.name);
     if (format == "csv") {
         export_csv(campaign, path);
     } else if (format == "mat") {
@@ -180,6 +180,7 @@ int export_campaign(const ExportOptions& options) {
     } else {
         whole = export_candump(campaign, path, format == "wireshark");
     }
+    working.reset();
     if (options.json) {
         std::cout << proto::json_text(nlohmann::ordered_json{{"campaign", campaign.head.name},
                                                              {"format", format},

@@ -188,8 +188,7 @@ int replay(const ReplayArguments& arguments) {
     options.speed = replay_speed(arguments.speed);
     record::Campaign campaign;
     {
-        Progress reading("reading " + arguments.files.front());
-        reading.show(0, 1);
+        const Working working("reading " + arguments.files.front());
         campaign = replayed_campaign(arguments);
         if (!arguments.config.empty()) {
             record::forget_noise(campaign);
