@@ -33,10 +33,17 @@ std::string host_name() {
     return ::gethostname(host.data(), host.size() - 1) == 0 ? host.data() : "";
 }
 
-/// The command that proves it.
+/// The command that proves it. What the dialogue measures together has one.
 std::string remedy_of(Part part) {
     if (of_the_shaker(part)) return "vibrig commission watchdog stop units excitation";
     return part == Part::gyros ? "vibrig commission gyros" : "vibrig commission";
+}
+
+/// The one for a part that was proven and has changed.
+std::string renewal_of(Part part) {
+    // `vibrig commission bus` lists what is on a bus.
+    if (part == Part::bus || of_the_shaker(part)) return remedy_of(part);
+    return fmt::format("vibrig commission {}", name_of(part));
 }
 
 /// Three zeros within what they may have moved.
@@ -240,7 +247,7 @@ std::string Book::refusal(std::int64_t utc_ns, Part last) const {
         if (s.proven || s.part > last) continue;
         if (s.record)  // the first that somebody has changed says most
             return fmt::format("not commissioned: {} ({}): {}", s.why, name_of(s.part),
-                               remedy_of(s.part));
+                               renewal_of(s.part));
         if (missing.empty()) command = remedy_of(s.part);
         missing += (missing.empty() ? "" : ", ") + std::string(name_of(s.part));
     }

@@ -74,7 +74,7 @@ TEST_F(Books, AKeyThatHasChangedVoidsItsPartsAndNoOthers) {
     const Book book(as);
     EXPECT_EQ(book.refusal(kNow),
               "not commissioned: platform.encoder_sign is [1, -1, 1], was proven as [1, 1, 1] by "
-              "A. Person, B. Person on 2026-11-18 (gimbals): vibrig commission");
+              "A. Person, B. Person on 2026-11-18 (gimbals): vibrig commission gimbals");
     std::string void_parts;
     for (const auto& s : book.standing(kNow))
         if (!s.proven) void_parts += std::string(name_of(s.part)) + " ";
