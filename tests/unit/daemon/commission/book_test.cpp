@@ -183,6 +183,26 @@ TEST_F(Books, AZeroThatWasFoundAnewIsReportedOnly) {
     EXPECT_THAT(Book(far).refusal(kNow), HasSubstr("accelerometer.zero_g"));
 }
 
+TEST_F(Books, WhatAReleaseNamedOtherwiseIsVoid) {
+    // GIVEN a record of a release that could name axes otherwise than the bus
+    const auto as = loaded();
+    prove_all(as);
+    const auto path = folder / "record.json";
+    Record old = record_from_json(text_of(path));
+    for (auto& [part, r] : old.parts) r.meaning = 1;
+    journal::SigningKey key((folder / "record.key").string());
+    std::ofstream(path) << to_json(old, &key);
+    // THEN the platform is to be measured again, and the shaker is not
+    const Book book(as);
+    EXPECT_EQ(book.refusal(kNow),
+              "not commissioned: proven on 2026-11-18 with a version 1 that names axes otherwise "
+              "(gimbals): vibrig commission gimbals");
+    std::string void_parts;
+    for (const auto& s : book.standing(kNow))
+        if (!s.proven) void_parts += std::string(name_of(s.part)) + " ";
+    EXPECT_EQ(void_parts, "gimbals accelerometers earth ");
+}
+
 TEST_F(Books, ARecordGrowsOld) {
     const auto as = loaded();
     prove_all(as);
