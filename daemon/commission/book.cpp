@@ -23,7 +23,11 @@ namespace vibrig::commission {
 namespace {
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-constexpr int kMeaning = 1;
+/// Of a part's keys, in records of this release. 1 of what gravity and the earth have named could be
+/// another naming than the bus has, an axis reversed or two exchanged, and say that it was decided.
+constexpr int meaning_of(Part part) {
+    return part == Part::gimbals || part == Part::accelerometers || part == Part::earth ? 2 : 1;
+}
 constexpr double kZeroMoved_g = 10e-3;  // `vibrig zero` may find so much anew
 constexpr const char* kDevice = "identity of the shaker's controller";
 constexpr const char* kZero = "accelerometer.zero_g";
@@ -178,8 +182,9 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             s.why = change(proven, keys_.at(part), s.moved);
             if (!s.why.empty())
                 s.why += fmt::format(" by {} on {}", fmt::join(r.by, ", "), date_of(r.utc_ns));
-            else if (r.meaning != kMeaning)
-                s.why = fmt::format("version {} counts its keys otherwise", r.version);
+            else if (r.meaning != meaning_of(part))
+                s.why = fmt::format("proven on {} with a version {} that names axes otherwise",
+                                    date_of(r.utc_ns), r.version);
             else if (!of_the_shaker(part) &&
                      (r.by.size() < 2 || proto::same_person(r.by[0], r.by[1])))
                 s.why = fmt::format("proven by {}, two persons are asked", fmt::join(r.by, ", "));
@@ -265,7 +270,7 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
         PartRecord one = what;
         one.keys = keys_of(part, as);
         if (of_the_shaker(part) && !device_.empty()) one.keys[kDevice] = Json(device_).dump();
-        one.meaning = kMeaning;
+        one.meaning = meaning_of(part);
         fresh.parts[part] = std::move(one);
     }
     write(std::move(fresh));
