@@ -23,8 +23,9 @@ namespace vibrig::commission {
 namespace {
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-/// Of a part's keys, in records of this release. 1 of what gravity and the earth have named could be
-/// another naming than the bus has, an axis reversed or two exchanged, and say that it was decided.
+/// Of a part's keys, in records of this release. 1 of what gravity and the earth have named could
+/// be another naming than the bus has, an axis reversed or two exchanged, and say that it was
+/// decided.
 constexpr int meaning_of(Part part) {
     return part == Part::gimbals || part == Part::accelerometers || part == Part::earth ? 2 : 1;
 }
