@@ -204,13 +204,19 @@ Alarm::Alarm(const AlarmSettings& settings) {
         horn_thread_ = std::thread([this] { run_horn(); });
         ::pthread_setname_np(horn_thread_.native_handle(), "horn");
     }
-    if (stop_pager_) {
+    if (!stop_pager_) return;
+    try {
         pager_thread_ = std::thread([this] { run_pager(); });
-        ::pthread_setname_np(pager_thread_.native_handle(), "pager");
+    } catch (const std::system_error&) {
+        end();  // nobody else does: the horn's runs, and this is not made
+        throw;
     }
+    ::pthread_setname_np(pager_thread_.native_handle(), "pager");
 }
 
-Alarm::~Alarm() {
+Alarm::~Alarm() { end(); }
+
+void Alarm::end() noexcept {
     {
         const std::lock_guard lock(mutex_);
         quit_ = true;

@@ -101,6 +101,7 @@ class Alarm {
     [[nodiscard]] bool confirms() const;
 
   private:
+    void end() noexcept;
     void run_horn();
     void run_pager();
     void sound(drivers::Time now);

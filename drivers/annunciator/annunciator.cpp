@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <system_error>
 
 #include "proto/json_text.hpp"
 
@@ -41,13 +42,19 @@ Annunciator::Annunciator(const AnnunciatorSettings& settings, Say said)
         horn_thread_ = std::thread([this] { run_horn(); });
         ::pthread_setname_np(horn_thread_.native_handle(), "horn");
     }
-    if (command_) {
+    if (!command_) return;
+    try {
         pager_thread_ = std::thread([this] { run_pager(); });
-        ::pthread_setname_np(pager_thread_.native_handle(), "pager");
+    } catch (const std::system_error&) {
+        end();  // nobody else does: the horn's runs, and this is not made
+        throw;
     }
+    ::pthread_setname_np(pager_thread_.native_handle(), "pager");
 }
 
-Annunciator::~Annunciator() {
+Annunciator::~Annunciator() { end(); }
+
+void Annunciator::end() noexcept {
     {
         const std::lock_guard lock(mutex_);
         quit_ = true;

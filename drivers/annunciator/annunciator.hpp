@@ -51,6 +51,7 @@ class Annunciator {
     [[nodiscard]] AnnunciatorStatus status() const;
 
   private:
+    void end() noexcept;
     void run_horn();
     void run_pager();
     void sound(Time now);
