@@ -34,7 +34,7 @@ psd = {json.dumps(PSD)}
 REGISTERS = {"mode": {"address": 8}, "profile_number": {"address": 9}, "profile_level_db": {"address": 10},
              "profile_checksum": {"address": 5}, "measured_g_rms": {"address": 7}, "control_state": {"address": 9}}
 ENDS = ("finished", "aborted", "tripped", "paused")
-WALL_S = 540
+WALL_S = 1800
 
 
 def random_run(position, role):

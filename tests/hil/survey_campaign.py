@@ -21,7 +21,7 @@ TRUTH = {**r.QUICK, "isolator": {"hard": True},
 HELD_OUT = [[30.0, 10.0, -20.0], [-50.0, 0.0, 70.0], [100.0, 15.0, 30.0], [20.0, 0.0, 130.0]]
 HELD_HZ, HELD_G = 55.1, 3.0
 ENDS = ("finished", "aborted", "tripped")
-WALL_S = 540   # a quiet machine takes a tenth of it
+WALL_S = 1800   # a quiet machine takes a tenth of it
 
 
 def vibrig(programs, *arguments):

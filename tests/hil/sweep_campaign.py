@@ -28,7 +28,7 @@ REGISTERS = {"mode": {"address": 8}, "sweep_from": {"address": 11, "type": "u32"
              "sweep_to": {"address": 13, "type": "u32", "scale": 0.001}, "sweep_rate": {"address": 15, "scale": 0.01},
              "actual_frequency": {"address": 10, "table": "input", "type": "u32", "scale": 0.001}}
 ENDS = ("finished", "aborted", "tripped", "paused")
-WALL_S = 540   # a quiet machine takes a tenth of it
+WALL_S = 1800   # a quiet machine takes a tenth of it
 
 
 def plan_of(folder, swept, standing, sweep_s):
