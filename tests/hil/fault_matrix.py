@@ -511,7 +511,7 @@ def main():
         if faults is None:
             faults, pause_s, events = int(float(option("--soak", "1")) * 15), 300, EVENTS
         what = f"soak:{option('--seed', random.randrange(1 << 30))}:{faults}:{pause_s}:{events}"
-    virtual = in_machine(programs, what, "-T", "-t", "200000", "--wall", str(2400 if "--soak" not in sys.argv else 36000))
+    virtual = in_machine(programs, what, "-T", "-t", "200000", "--wall", str(4800 if "--soak" not in sys.argv else 36000))
     real = in_machine(programs, "busy", "-t", "120") if what == "matrix" else 0   # a hog would stop the virtual clock
     return virtual or real
 
