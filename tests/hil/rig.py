@@ -259,7 +259,7 @@ class Rig:
     def start_daemon(self):
         self.daemon = Child("vibrigd", [self.program("vibrigd"), "--config", self.configuration], self.folder)
 
-    def tool(self, *arguments, timeout=30, late_disk=True):
+    def tool(self, *arguments, timeout=180, late_disk=True):
         """`late_disk`: an arming that a busy machine's disk has not written in its time is asked for again."""
         for tries_left in reversed(range(5 if late_disk and arguments[0] == "arm" else 1)):
             run = subprocess.run([self.program("vibrig"), *arguments, "--socket", self.socket], stdin=subprocess.DEVNULL,
