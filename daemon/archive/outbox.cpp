@@ -95,7 +95,6 @@ Outbox::Outbox(configuration::ArchiveSettings settings, std::string recordings, 
       event_(std::move(event)) {
     status_.folder = settings_.folder;
     status_.good = true;
-    read_ = status_;
 }
 
 Outbox::~Outbox() { stop(); }
@@ -121,12 +120,9 @@ void Outbox::look() {
     changed_.notify_all();
 }
 
-/// Its thread is the last to have a processor, also while it holds the lock: who looks does not
-/// wait.
 ArchiveStatus Outbox::status() const {
-    const std::lock_guard reading(readers_);
-    if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) read_ = status_;
-    return read_;
+    const std::lock_guard lock(mutex_);
+    return status_;
 }
 
 std::string Outbox::history() const {

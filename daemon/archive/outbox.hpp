@@ -95,8 +95,6 @@ class Outbox {
     ArchiveStatus status_;
     std::string history_;
     TypeKnown type_known_;
-    mutable std::mutex readers_;  ///< never its thread's
-    mutable ArchiveStatus read_;  ///< as others have read it last
     std::thread thread_;
 };
 
