@@ -13,6 +13,7 @@ namespace vibrig::tool {
 namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(500);
+constexpr int kAtOnce = 1000;
 constexpr const char* kStream = "/api/v1/stream?status=false&rate_hz=10&after=";
 
 void print(const v1::Event& event, bool json) {
@@ -41,10 +42,13 @@ struct Cursor {
     std::uint64_t after = 0;
 };
 
-/// Prints what is new; false when there was nothing.
+/// Prints what is new; true where there is more than one answer holds. What is told meanwhile is
+/// not waited for: a daemon that is never quiet would never be done with.
 bool print_new(serve::Client& client, Cursor& cursor, bool json) {
     v1::Events answer;
-    parse_answer(client.get("/api/v1/events?after=" + std::to_string(cursor.after)), answer);
+    parse_answer(client.get("/api/v1/events?after=" + std::to_string(cursor.after) +
+                            "&limit=" + std::to_string(kAtOnce)),
+                 answer);
     if (!cursor.instance.empty() && answer.instance() != cursor.instance) {
         std::cerr << "vibrig: the daemon has started anew\n";
         cursor = {answer.instance(), 0};
@@ -56,7 +60,7 @@ bool print_new(serve::Client& client, Cursor& cursor, bool json) {
         cursor.after = event.id();
     }
     std::cout.flush();
-    return answer.events_size() > 0;
+    return answer.events_size() >= kAtOnce;
 }
 
 /// A message of the stream; false: it is another daemon's, whose events count anew, or nobody

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/write.hpp>
@@ -305,6 +306,37 @@ TEST_F(Tool, ListsEvents) {
     EXPECT_NE(outcome.output.find("event 2500\n"), std::string::npos);
     const Outcome json = vibrig("events --json" + at);
     EXPECT_EQ(json.output.rfind("{\"id\":\"1\"", 0), 0u) << json.output.substr(0, 200);
+}
+
+/// Something is told between any two questions, for a thousand of them.
+class NeverQuiet : public FakeSource {
+  public:
+    mutable std::atomic<int> questions{0};
+
+    [[nodiscard]] std::vector<EventRecord> events(std::uint64_t after_id,
+                                                  std::size_t /*at_most*/) const override {
+        if (++questions > 1000) return {};
+        EventRecord event;
+        event.id = after_id + 1;
+        event.text = "one more";
+        return {event};
+    }
+};
+
+TEST_F(Tool, PrintsTheEventsUntilNowOfADaemonThatIsNeverQuiet) {
+    NeverQuiet never_quiet;
+    const StatusServer server(never_quiet, path);
+    const Outcome outcome = vibrig("events" + at);
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_EQ(never_quiet.questions, 1);
+}
+
+TEST_F(Tool, PrintsMoreEventsThanOneAnswerHas) {
+    for (int i = 1; i <= 2500; ++i) tell("event " + std::to_string(i) + " of 2500");
+    const StatusServer server(source, path);
+    const Outcome outcome = vibrig("events" + at);
+    EXPECT_EQ(std::ranges::count(outcome.output, '\n'), 2500);
+    EXPECT_NE(outcome.output.find("event 2500 of 2500"), std::string::npos);
 }
 
 /// `vibrig events --follow`, until it goes out of scope.
