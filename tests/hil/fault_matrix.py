@@ -205,11 +205,13 @@ class FaultRig(r.Rig):
         return self.ask("/api/v1/commands", {"kind": kind, "by": "tester", "argument": argument})
 
     def rest(self):
-        """Clears what the last fault left, until the rig could be armed."""
+        """Clears what the last fault left, until the rig could be armed; at once where it has left a table that shakes."""
         self.order("clear")
         self.proxy.break_with(None)
 
         def clear(status):
+            if status["campaign"]["state"] == "recording":
+                return True
             if status["campaign"]["state"] == "tripped":
                 self.command("acknowledge", "trip")
             elif status["shaker"].get("fault") or status["shaker"].get("watchdog_timeout_s") in (0, 60):   # of other masters
