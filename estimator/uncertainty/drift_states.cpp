@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <optional>
 
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/uncertainty/drift_hypotheses.hpp"
 #include "estimator/uncertainty/rates_covariance.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -17,11 +20,7 @@ using Unbalance = DriftHypothesis::Unbalance;
 
 constexpr double kStepSize = 12.0;      ///< prior size of a step, in s0
 constexpr double kUnbalanceSize = 8.0;  ///< in s0 / g
-constexpr double kNothing = 0.6;        ///< prior weight of a value of zero
-constexpr std::size_t kMostPlaces = 40;
-constexpr Index kFirstLinear = 1;  ///< of the three linear terms
-/// With fewer rates to spare the data cannot tell one hypothesis from another.
-constexpr Index kFewestDwells = 12;
+constexpr Index kFirstLinear = 1;       ///< of the three linear terms
 constexpr double kLeastWeight = 1e-12;  ///< less moves no digit
 constexpr double kLeastBeside = 1e-3;   ///< of a hypothesis beside which others are weighed
 constexpr int kWalkTerms = 40;
@@ -39,82 +38,6 @@ VectorXd step_after(Index n, int dwells) {
     VectorXd z = VectorXd::Zero(n);
     z.tail(n - dwells).setOnes();
     return about_mean(z);
-}
-
-struct Weighted {
-    DriftHypothesis what;
-    double weight;
-};
-
-double share(double size, const std::vector<double>& sizes) {
-    if (size == 0) return kNothing;
-    double sum = 0;
-    for (const double other : sizes) sum += other > 0 ? 1 / (1 + other / 2) : 0;
-    return (1 - kNothing) / (1 + size / 2) / sum;
-}
-
-/// Places from `first` to `last`, thinned if there are too many.
-std::vector<int> places(Index first, Index last) {
-    std::vector<int> all;
-    if (last < first) return all;
-    const auto count = static_cast<std::size_t>(last - first + 1);
-    const std::size_t kept = count > 120 ? kMostPlaces : count;
-    for (std::size_t i = 0; i < kept; ++i)
-        all.push_back(static_cast<int>(first + static_cast<Index>(i * count / kept)));
-    return all;
-}
-
-void add_slow(std::vector<Weighted>& list) {
-    static const std::vector<double> kScatterSizes{0, 1, 2, 4, 8, 16},
-        kWalkSizes{0, 2, 4, 8, 16, 32}, kTrendSizes{0, 4, 16};
-    for (const double a : kScatterSizes) {
-        for (const double b : kWalkSizes) {
-            for (const double c : kTrendSizes) {
-                list.push_back({{a, b, c},
-                                0.85 * share(a, kScatterSizes) * share(b, kWalkSizes) *
-                                    share(c, kTrendSizes)});
-            }
-        }
-    }
-}
-
-void add_steps(std::vector<Weighted>& list, Index n, const std::vector<std::size_t>& breaks) {
-    constexpr std::array<std::pair<double, double>, 3> kWalks{{{0, 0.6}, {4, 0.2}, {16, 0.2}}};
-    const std::vector<int> at = places(2, n - 2);
-    for (const int k : at) {
-        if (std::find(breaks.begin(), breaks.end(), static_cast<std::size_t>(k)) != breaks.end())
-            continue;
-        for (const auto& [walk, part] : kWalks)
-            list.push_back({{0, walk, 0, k}, 0.1 / static_cast<double>(at.size()) * part});
-    }
-    for (const std::size_t k : breaks) {
-        if (k < 1 || static_cast<Index>(k) >= n) continue;
-        for (const auto& [walk, part] : kWalks)
-            list.push_back({{0, walk, 0, static_cast<int>(k)}, 0.5 * part});
-    }
-}
-
-void add_unbalance(std::vector<Weighted>& list, Index n) {
-    for (const double walk : {0.0, 4.0}) list.push_back({{0, walk, 0, 0, Unbalance::trend}, 0.01});
-    const std::vector<int> at = places(3, n - 3);
-    for (const int k : at)
-        list.push_back({{0, 0, 0, k, Unbalance::step}, 0.03 / static_cast<double>(at.size())});
-}
-
-std::vector<Weighted> hypotheses(const GyroRates& gyro, const Drift& drift, double s0) {
-    const Index n = gyro.dwells();
-    const double span_h = gyro.time_h[n - 1] - gyro.time_h[0];
-    std::vector<Weighted> list;
-    if (drift.model == BiasModel::walk) {
-        list.push_back({{0, drift.walk_deg_h_rt_h * std::sqrt(span_h) / s0, 0}, 1});
-    } else if (drift.model == BiasModel::constant || n < kFewestDwells) {
-        list.push_back({{}, 1});
-    } else {
-        add_slow(list);
-        add_steps(list, n, gyro.breaks);
-        add_unbalance(list, n);
-    }
-    return list;
 }
 
 /// What the covariances of all hypotheses are made of.
@@ -147,11 +70,6 @@ struct Kernels {
         return out;
     }
 
-    [[nodiscard]] RatesCovariance covariance(const GyroRates& gyro,
-                                             const DriftHypothesis& what) const {
-        return drifting(gyro.variance.array() + s0 * s0 * what.scatter * what.scatter, elapsed,
-                        s0 * s0 * what.walk * what.walk, columns(gyro, what));
-    }
     /// Covariance of the bias at the last dwell with that at each.
     [[nodiscard]] VectorXd with_last(const GyroRates& gyro, const DriftHypothesis& what) const {
         const Index last = gyro.dwells() - 1;
@@ -167,24 +85,36 @@ struct Kernels {
     VectorXd walk_mean;
 };
 
+/// What all hypotheses of one scatter and one walk have in common: most of the work.
+struct Common {
+    Common(const GyroRates& gyro, const Kernels& kernels, double scatter, double walk_size)
+        : walk(kernels.s0 * kernels.s0 * walk_size * walk_size),
+          rates(gyro.variance.array() + kernels.s0 * kernels.s0 * scatter * scatter,
+                kernels.elapsed, walk) {
+        MatrixXd columns(gyro.dwells(), gyro.regressors.cols() + 1);
+        columns << gyro.regressors, gyro.rate;
+        data = rates.whiten(columns);
+    }
+    double walk;
+    RatesCovariance rates;           ///< nothing added yet
+    RatesCovariance::Whitened data;  ///< regressors, and the rates behind them
+};
+
 /// Generalised least squares with a prior.
 struct Fit {
-    Fit(const GyroRates& gyro, RatesCovariance of_rates) : rates(std::move(of_rates)) {
+    Fit(const GyroRates& gyro, const Kernels& kernels, const Common& common,
+        const MatrixXd& columns)
+        : rates(drifting(common.rates, kernels.elapsed, common.walk, columns)),
+          square(rates.square(common.data)),
+          normal(normal_matrix(gyro, square)) {
         const Index terms = gyro.regressors.cols();
-        MatrixXd columns(gyro.dwells(), terms + 1);
-        columns << gyro.regressors, gyro.rate;
-        const MatrixXd square = rates.square(columns);
-        MatrixXd information = square.topLeftCorner(terms, terms);
-        information.diagonal() += gyro.prior_information;
-        const auto normal = linear_algebra::Cholesky::or_nan(information);
         const VectorXd right = square.col(terms).head(terms);
-        covariance_of = normal.inverse();
-        value = covariance_of * right;
+        value = normal.solve(right);
         log_likelihood = -0.5 * (rates.log_determinant() + normal.log_det() + square(terms, terms) -
                                  right.dot(value));
     }
     [[nodiscard]] MatrixXd gain(const GyroRates& gyro) const {
-        return covariance_of * rates.solve(gyro.regressors).transpose();
+        return normal.solve(rates.solve(gyro.regressors).transpose());
     }
     /// Estimate and variance of the amplitude of a column that the covariance holds with a prior
     /// variance.
@@ -192,15 +122,41 @@ struct Fit {
                                                       double prior) const {
         const VectorXd of_z = rates.solve(z);
         const VectorXd left =
-            of_z -
-            rates.solve(gyro.regressors * (covariance_of * (gyro.regressors.transpose() * of_z)));
+            of_z - rates.solve(gyro.regressors *
+                               normal.solve(VectorXd(gyro.regressors.transpose() * of_z)));
         return {prior * left.dot(gyro.rate), prior - prior * prior * left.dot(z)};
     }
 
     RatesCovariance rates;
-    MatrixXd covariance_of;
+    MatrixXd square;  ///< of regressors and rates
+    linear_algebra::Cholesky normal;
     VectorXd value;
     double log_likelihood = 0;
+
+  private:
+    [[nodiscard]] static linear_algebra::Cholesky normal_matrix(const GyroRates& gyro,
+                                                                const MatrixXd& square) {
+        const Index terms = gyro.regressors.cols();
+        MatrixXd information = square.topLeftCorner(terms, terms);
+        information.diagonal() += gyro.prior_information;
+        return linear_algebra::Cholesky::or_nan(information);
+    }
+};
+
+/// Fits of hypotheses, each with what it has in common with others.
+class Fits {
+  public:
+    explicit Fits(const GyroRates& gyro) : kernels(gyro), gyro_(gyro) {}
+    [[nodiscard]] Fit of(const DriftHypothesis& what) {
+        auto& common = common_[{what.scatter, what.walk}];
+        if (!common) common.emplace(gyro_, kernels, what.scatter, what.walk);
+        return Fit(gyro_, kernels, *common, kernels.columns(gyro_, what));
+    }
+    const Kernels kernels;
+
+  private:
+    const GyroRates& gyro_;
+    std::map<std::pair<double, double>, std::optional<Common>> common_;
 };
 
 void add_to(DriftWeights& sum, const DriftHypothesis& what, double w) {
@@ -225,7 +181,7 @@ std::pair<double, double> bias_now(const GyroRates& gyro, const Kernels& kernels
     const VectorXd row =
         VectorXd::Unit(fit.value.size(), 0) - gyro.regressors.transpose() * of_last;
     const double variance =
-        last[gyro.dwells() - 1] - last.dot(of_last) + row.dot(fit.covariance_of * row);
+        last[gyro.dwells() - 1] - last.dot(of_last) + fit.normal.whiten(row).squaredNorm();
     return {fit.value[0] + moved, std::max(0.0, variance)};
 }
 
@@ -238,12 +194,11 @@ double trend_of(const GyroRates& gyro, const Kernels& kernels, const DriftHypoth
 }
 
 /// Weights of the hypotheses after the rates, their sum 1, and the logarithm of what it was.
-std::pair<std::vector<double>, double> weigh(const GyroRates& gyro, const Kernels& kernels,
-                                             const std::vector<Weighted>& list) {
+std::pair<std::vector<double>, double> weigh(Fits& fits,
+                                             const std::vector<WeightedHypothesis>& list) {
     std::vector<double> weights;
-    for (const Weighted& one : list)
-        weights.push_back(Fit(gyro, kernels.covariance(gyro, one.what)).log_likelihood +
-                          std::log(one.weight));
+    for (const WeightedHypothesis& one : list)
+        weights.push_back(fits.of(one.what).log_likelihood + std::log(one.weight));
     const double largest = *std::max_element(weights.begin(), weights.end());
     double sum = 0;
     for (double& w : weights) sum += w = std::exp(w - largest);
@@ -256,8 +211,8 @@ bool is_step(const DriftHypothesis& what) {
 }
 
 /// The likeliest place of a step, with its size by the likeliest hypothesis there.
-DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
-                    const std::vector<Weighted>& list, const std::vector<double>& weights) {
+DriftStep find_step(const GyroRates& gyro, Fits& fits, const std::vector<WeightedHypothesis>& list,
+                    const std::vector<double>& weights) {
     std::vector<double> at(static_cast<std::size_t>(gyro.dwells()), 0.0);
     for (std::size_t i = 0; i < list.size(); ++i) {
         if (is_step(list[i].what))
@@ -277,10 +232,9 @@ DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
         best = &list[i].what;
         best_weight = weights[i];
     }
-    const Fit fit(gyro, kernels.covariance(gyro, *best));
-    const double prior = kStepSize * kStepSize * kernels.s0 * kernels.s0;
+    const double prior = kStepSize * kStepSize * fits.kernels.s0 * fits.kernels.s0;
     const auto [size, variance] =
-        fit.amplitude(gyro, step_after(gyro.dwells(), step.after_dwell), prior);
+        fits.of(*best).amplitude(gyro, step_after(gyro.dwells(), step.after_dwell), prior);
     step.size = size;
     step.sigma = std::sqrt(std::max(0.0, variance));
     return step;
@@ -288,11 +242,8 @@ DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
 
 double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
     const Kernels kernels(gyro);
-    const double unit = kernels.s0 * kernels.s0;
     const MatrixXd declared = gyro.declared.rows() > 0 ? gyro.declared : MatrixXd(gyro.dwells(), 0);
-    return Fit(gyro, drifting(gyro.variance.array() + unit * scatter * scatter, kernels.elapsed,
-                              unit * walk * walk, declared))
-        .log_likelihood;
+    return Fit(gyro, kernels, Common(gyro, kernels, scatter, walk), declared).log_likelihood;
 }
 
 }  // namespace
@@ -300,9 +251,10 @@ double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
 double unit_of(const VectorXd& variance) { return std::sqrt(1 / variance.cwiseInverse().mean()); }
 
 DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
-    const Kernels kernels(gyro);
-    const std::vector<Weighted> list = hypotheses(gyro, drift, kernels.s0);
-    const auto [weights, log_evidence] = weigh(gyro, kernels, list);
+    Fits fits(gyro);
+    const Kernels& kernels = fits.kernels;
+    const std::vector<WeightedHypothesis> list = drift_hypotheses(gyro, drift, kernels.s0);
+    const auto [weights, log_evidence] = weigh(fits, list);
     DriftAverage out;
     out.log_evidence = log_evidence;
     const Index terms = gyro.regressors.cols();
@@ -316,9 +268,9 @@ DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
         const double w = weights[i];
         add_to(out.weights, list[i].what, w);
         if (w < kLeastWeight) continue;
-        const Fit fit(gyro, kernels.covariance(gyro, list[i].what));
+        const Fit fit = fits.of(list[i].what);
         out.value += w * fit.value;
-        out.covariance += w * fit.covariance_of;
+        out.covariance += w * fit.normal.inverse();
         out.gain += w * fit.gain(gyro);
         values.emplace_back(w, fit.value);
         const auto [now, variance] = bias_now(gyro, kernels, list[i].what, fit);
@@ -334,7 +286,7 @@ DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     out.bias_now_sigma = std::sqrt(std::max(0.0, now_square - out.bias_now * out.bias_now));
     std::stable_sort(out.likeliest.begin(), out.likeliest.end(),
                      [](const auto& a, const auto& b) { return a.second > b.second; });
-    out.step = find_step(gyro, kernels, list, weights);
+    out.step = find_step(gyro, fits, list, weights);
     return out;
 }
 

@@ -73,9 +73,13 @@ VectorXd walk_means(const VectorXd& elapsed) {
 
 RatesCovariance drifting(const VectorXd& noise, const VectorXd& elapsed, double walk,
                          const MatrixXd& columns) {
-    RatesCovariance out(noise, elapsed, walk);
+    return drifting(RatesCovariance(noise, elapsed, walk), elapsed, walk, columns);
+}
+
+RatesCovariance drifting(RatesCovariance still, const VectorXd& elapsed, double walk,
+                         const MatrixXd& columns) {
     const Index r = columns.cols(), of_mean = walk > 0 ? 2 : 0;
-    MatrixXd u(noise.size(), r + of_mean);
+    MatrixXd u(elapsed.size(), r + of_mean);
     MatrixXd inverse = MatrixXd::Identity(r + of_mean, r + of_mean);
     u.leftCols(r) = columns;
     if (walk > 0) {
@@ -86,15 +90,22 @@ RatesCovariance drifting(const VectorXd& noise, const VectorXd& elapsed, double 
         inverse.bottomRightCorner<2, 2>() << 0, -1, -1, -means.mean();
         inverse.bottomRightCorner<2, 2>() /= walk;
     }
-    out.add(u, inverse);
-    return out;
+    still.add(u, inverse);
+    return still;
 }
 
-MatrixXd RatesCovariance::square(const MatrixXd& x) const {
-    const MatrixXd white = whitened(x);
-    MatrixXd out = white.transpose() * white;
+RatesCovariance::Whitened RatesCovariance::whiten(const MatrixXd& x) const {
+    MatrixXd white = whitened(x);
+    MatrixXd square = white.transpose() * white;
+    return {std::move(white), std::move(square)};
+}
+
+MatrixXd RatesCovariance::square(const MatrixXd& x) const { return square(whiten(x)); }
+
+MatrixXd RatesCovariance::square(const Whitened& of) const {
+    MatrixXd out = of.square;
     if (columns_.cols() > 0) {
-        const MatrixXd seen = columns_.transpose() * white;
+        const MatrixXd seen = columns_.transpose() * of.x;
         out -= seen.transpose() * core_->solve(seen);
     }
     return out;

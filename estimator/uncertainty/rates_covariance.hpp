@@ -18,10 +18,19 @@ class RatesCovariance {
     /// Once: U and the inverse of M, which may be indefinite as long as the sum is positive.
     void add(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& inverse_core);
 
+    /// x of whatever columns are added: for many covariances that differ only in those.
+    struct Whitened {
+        Eigen::MatrixXd x;       ///< n x m
+        Eigen::MatrixXd square;  ///< x' A^-1 x
+    };
+    [[nodiscard]] Whitened whiten(const Eigen::MatrixXd& x) const;
+
     /// Cov^-1 x, n x m.
     [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& x) const;
     /// x' Cov^-1 x for columns x.
     [[nodiscard]] Eigen::MatrixXd square(const Eigen::MatrixXd& x) const;
+    /// The same; `of`: by a covariance of the same noise and walk.
+    [[nodiscard]] Eigen::MatrixXd square(const Whitened& of) const;
     [[nodiscard]] double log_determinant() const { return log_determinant_; }
 
   private:
@@ -38,6 +47,9 @@ class RatesCovariance {
 /// `columns`, each of unit prior variance: diag(noise) + walk P min(tau_i, tau_j) P + U U', P what
 /// takes the mean out.
 [[nodiscard]] RatesCovariance drifting(const Eigen::VectorXd& noise, const Eigen::VectorXd& elapsed,
+                                       double walk, const Eigen::MatrixXd& columns);
+/// The same; `still`: of that noise and walk, without any columns.
+[[nodiscard]] RatesCovariance drifting(RatesCovariance still, const Eigen::VectorXd& elapsed,
                                        double walk, const Eigen::MatrixXd& columns);
 /// Means over j of min(tau_i, tau_j).
 [[nodiscard]] Eigen::VectorXd walk_means(const Eigen::VectorXd& elapsed);
