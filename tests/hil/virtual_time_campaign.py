@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Unmodified programs on a real vcan0 in virtual time: the full campaign, and a shorter one twice with equal estimates.
 
-usage: virtual_time_campaign.py PROGRAMS [--soak]            boots two machines at a time; dwells of 40 s, with --soak of 100 s
+usage: virtual_time_campaign.py PROGRAMS [--soak]            boots two machines at a time; dwells of 20 s, with --soak of 100 s
        virtual_time_campaign.py PROGRAMS --inside NAME DIR   one campaign, inside; its result.json goes to DIR
 """
 import ctypes
@@ -29,7 +29,7 @@ START_S = 0.0037
 POLL_S = 10
 CAMPAIGNS = {
     # 14 positions, 9 g and 7 g at the table: the defaults
-    "full": {"name": "full", "dwell_s": 40.0},
+    "full": {"name": "full", "dwell_s": 20.0},
     "whole": {"name": "full"},   # dwells of 100 s
     "short": {"name": "short", "identify": "what-it-can",
               "positions_deg": [[0, 0, 0], [45, 0, 90], [270, 0, 0]], "table_g": [9.0, 7.0],
