@@ -23,6 +23,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 import service_manager as stages  # noqa: E402
+import vcan_campaign  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 UNIT = "vibrigd.service"
@@ -145,7 +146,7 @@ def makes_interfaces(checks):
 def configure(rig, **more):
     rig.configure(rig.campaign, can={"sample_rate_hz": 40.0, **r.PATIENT["can"]}, gimbal=r.PATIENT["gimbal"],
                   shaker=r.PATIENT["shaker"], server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
-                          "page": "127.0.0.1:8090"}, **more)
+                          "page": "127.0.0.1:8090"}, threads=rig.threads, **more)
     os.chmod(CONFIGURATION, 0o640)
     shutil.chown(CONFIGURATION, "root", "vibrig")
 
@@ -213,7 +214,8 @@ def runs_a_campaign(checks, rig, timeout_s):
 
 
 def is_guarded(checks, rig):
-    """The guard's unit beside the daemon's, for this part only."""
+    """The guard's unit beside the daemon's, for this part only. From here on the priorities, which were seen, cost only time."""
+    rig.threads = vcan_campaign.THREADS
     configure(rig, guard={"socket": "/run/vibrig-guard/guard.sock"})
     succeeds(checks, "systemctl enable --now vibrig-guard", "systemctl", "enable", "--now", GUARD)
     output("systemctl", "restart", UNIT)
@@ -423,7 +425,7 @@ def inside(programs, old, new, soak):
         timed(makes_interfaces)
         rig = r.Rig("/usr/bin", "vcan0", "real", folder)
         rig.configuration, rig.results, rig.socket = CONFIGURATION, DATA, "/run/vibrig/vibrigd.sock"
-        rig.campaign = WHOLE if soak else SHORT
+        rig.campaign, rig.threads = WHOLE if soak else SHORT, {}
         rig.programs = programs   # the rig is there when the package is not
         rig.start_plant("--seed", str(SEED), *(() if soak else ("--warm-up", "1", "--start-temperature", "45")))
         rig.programs = "/usr/bin"
