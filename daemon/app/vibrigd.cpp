@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstring>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "daemon/app/campaign_forecast.hpp"
@@ -29,6 +30,7 @@
 #include "proto/command_tree.hpp"
 #include "proto/dbc.hpp"
 #include "proto/empty_value.hpp"
+#include "proto/json_text.hpp"
 #include "proto/shipped_text.hpp"
 
 namespace {
@@ -217,26 +219,43 @@ Prints prints() {
               [] { return vibrig::serve::openapi_json() + "\n"; }}}};
 }
 
+/// What is doubtful of a configuration that is valid.
+std::vector<std::string> warnings_of(const vibrig::configuration::Loaded& loaded) {
+    auto out = vibrig::configuration::warnings(loaded);
+    if (const auto why = vibrig::missing_group(loaded); !why.empty())
+        out.push_back(why + "; a start on this machine is refused");
+    for (std::string& line : vibrig::slow_statuses(loaded)) out.push_back(std::move(line));
+    for (const std::string& line : vibrig::check_plan(loaded.configuration))
+        out.push_back("campaign: " + line);
+    return out;
+}
+
 /// --check: the effective configuration, and what can be said of its campaign.
-void print_check(const vibrig::configuration::Loaded& loaded) {
+void print_check(const vibrig::configuration::Loaded& loaded, bool as_json) {
     vibrig::check_bindings(loaded);
     vibrig::check_results(loaded);
     const auto effective = vibrig::configuration::format_effective(loaded);
-    std::cout << effective
-              << "# SHA-256 of what stands above: " << vibrig::record::sha256_of_text(effective)
-              << '\n';
-    // As comments: what stands above reads back as a configuration.
+    const auto sha256 = vibrig::record::sha256_of_text(effective);
     const auto forecast = vibrig::forecast_campaign(loaded.configuration);
-    std::istringstream words(forecast.words);
-    for (std::string line; std::getline(words, line);) std::cout << "# " << line << '\n';
-    for (const std::string& line : vibrig::configuration::warnings(loaded))
-        std::cerr << "warning: " << line << '\n';
-    if (const auto why = vibrig::missing_group(loaded); !why.empty())
-        std::cerr << "warning: " << why << "; a start on this machine is refused\n";
-    for (const std::string& line : vibrig::slow_statuses(loaded))
-        std::cerr << "warning: " << line << '\n';
-    for (const std::string& line : vibrig::check_plan(loaded.configuration))
-        std::cerr << "warning: campaign: " << line << '\n';
+    const auto warnings = warnings_of(loaded);
+    std::vector<std::string> words;
+    std::istringstream lines(forecast.words);
+    for (std::string line; std::getline(lines, line);) words.push_back(line);
+    if (as_json) {
+        using Json = nlohmann::ordered_json;
+        const Json all{
+            {"sha256", sha256},
+            {"forecast", words},
+            {"refusal", forecast.refusal},
+            {"warnings", warnings},
+            {"configuration", Json::parse(vibrig::configuration::format_effective_json(loaded))}};
+        std::cout << vibrig::proto::json_text(all, 2) << '\n';
+    } else {
+        // As comments: what stands above reads back as a configuration.
+        std::cout << effective << "# SHA-256 of what stands above: " << sha256 << '\n';
+        for (const std::string& line : words) std::cout << "# " << line << '\n';
+    }
+    for (const std::string& line : warnings) std::cerr << "warning: " << line << '\n';
     insist(forecast);
 }
 
@@ -267,10 +286,12 @@ int main(int argc, char** argv) {
     app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");
     app.set_version_flag("--version", std::string("vibrigd ") + vibrig::kVersion);
     std::string path;
-    bool check = false;
+    bool check = false, as_json = false;
     app.add_option("--config", path, "configuration file (TOML); all defaults without one");
-    app.add_flag("--check", check,
-                 "validate, print the effective configuration with units and origins, and end");
+    auto* const checks =
+        app.add_flag("--check", check,
+                     "validate, print the effective configuration with units and origins, and end");
+    app.add_flag("--json", as_json, "with --check: as JSON, for machines")->needs(checks);
     auto printable = prints();
     for (Print& print : printable) app.add_flag(print.flag, print.asked, print.text);
     std::string instruction_set = "auto";
@@ -308,7 +329,7 @@ int main(int argc, char** argv) {
         auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_named(loaded);
         if (check) {
-            print_check(loaded);
+            print_check(loaded, as_json);
             return vibrig::proto::print_status(app);
         }
         const auto& file = loaded.configuration.log_file;

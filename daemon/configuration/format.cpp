@@ -1,10 +1,15 @@
+#include <toml++/toml.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/schema.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::configuration {
 
@@ -72,6 +77,21 @@ std::string format_effective(const Loaded& loaded) {
                         value.origin, value.doc});
     }
     return columns(rows);
+}
+
+std::string format_effective_json(const Loaded& loaded) {
+    // The values are TOML, which its own library turns into JSON.
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const EffectiveValue& value : loaded.effective) {
+        std::ostringstream json;
+        json << toml::json_formatter{toml::parse("value = " + value.value)};
+        list.push_back({{"key", value.key},
+                        {"value", nlohmann::ordered_json::parse(json.str())["value"]},
+                        {"unit", value.unit},
+                        {"origin", value.origin},
+                        {"meaning", value.doc}});
+    }
+    return proto::json_text(list);
 }
 
 std::string format_schema() {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/json_file.hpp"
+#include "proto/json_text.hpp"
 
 namespace vibrig::plant {
 namespace {
@@ -114,6 +115,24 @@ std::string table_of(const Verdict& verdict) {
                   std::abs(worst.ratio),
                   verdict.passed ? "all 30 within the limit" : "NOT all 30 within the limit");
     return text + end.data();
+}
+
+std::string json_of(const Verdict& verdict) {
+    using Ordered = nlohmann::ordered_json;  // which writes NaN as null
+    Ordered list = Ordered::array();
+    for (const JudgedCoefficient& c : verdict.coefficients) {
+        list.push_back({{"name", c.name},
+                        {"unit", c.unit},
+                        {"truth", c.truth},
+                        {"estimate", c.estimate},
+                        {"sigma", c.sigma},
+                        {"error_over_sigma", c.ratio},
+                        {"fault", c.fault}});
+    }
+    const Ordered all{{"passed", verdict.passed},
+                      {"worst", verdict.coefficients[verdict.worst].name},
+                      {"coefficients", list}};
+    return proto::json_text(all, 2) + "\n";
 }
 
 }  // namespace vibrig::plant

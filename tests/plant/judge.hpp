@@ -28,5 +28,7 @@ struct Verdict {
 [[nodiscard]] Verdict judge(const std::string& result_json, const std::string& file_name,
                             const Truth& truth, double sigma_limit);
 [[nodiscard]] std::string table_of(const Verdict& verdict);
+/// The same for machines: {"passed", "worst", "coefficients": [..]}; what is not there is null.
+[[nodiscard]] std::string json_of(const Verdict& verdict);
 
 }  // namespace vibrig::plant

@@ -15,6 +15,7 @@ void add_judge_command(CLI::App& app, int& exit_code) {
         std::string result;
         std::string truth;
         double sigma = 4;
+        bool json = false;
     };
     auto o = std::make_shared<Options>();
     CLI::App* command =
@@ -30,6 +31,7 @@ void add_judge_command(CLI::App& app, int& exit_code) {
                      "largest error in standard deviations: u_a, or sigma where there is none")
         ->check(proto::finite(0.1, 1000.0))
         ->capture_default_str();
+    command->add_flag("--json", o->json, "as JSON, for machines");
     command->footer(
         "Exit code 0 only if all 30 coefficients are there, observable, finite and within the "
         "limit; 1 otherwise,\n"
@@ -40,7 +42,7 @@ void add_judge_command(CLI::App& app, int& exit_code) {
                                             "an identification result (JSON)");
         const Truth truth = o->truth.empty() ? Truth{} : read_truth(o->truth);
         const Verdict verdict = judge(text, o->result, truth, o->sigma);
-        std::cout << table_of(verdict) << std::flush;
+        std::cout << (o->json ? json_of(verdict) : table_of(verdict)) << std::flush;
         exit_code = verdict.passed ? 0 : 1;
     });
 }

@@ -56,6 +56,30 @@ TEST(Judge, FailsWhatIsFarMissingNullOrUnobservable) {
     EXPECT_FALSE(judged(perfect(), 0.5).passed);
 }
 
+TEST(Judge, SaysTheSameInJson) {
+    // GIVEN a result with one that is wrong and one that is not there
+    nlohmann::json root = perfect();
+    root["parameters"][3]["value"] = root["parameters"][3]["value"].get<double>() + 0.0041;
+    root["parameters"].erase(4);
+    const Verdict verdict = judged(root);
+    const auto json = nlohmann::json::parse(json_of(verdict));
+    // THEN all 30 are there, each as the table has it, and what is missing is null
+    EXPECT_EQ(json["passed"], false);
+    EXPECT_EQ(json["worst"], verdict.coefficients[4].name);
+    ASSERT_EQ(json["coefficients"].size(), 30U);
+    for (std::size_t i = 0; i < 30; ++i) {
+        EXPECT_EQ(json["coefficients"][i]["name"], verdict.coefficients[i].name);
+        EXPECT_EQ(json["coefficients"][i]["truth"], verdict.coefficients[i].truth);
+        EXPECT_EQ(json["coefficients"][i]["fault"], i == 3   ? "too far off"
+                                                    : i == 4 ? "missing"
+                                                             : "");
+    }
+    EXPECT_NEAR(json["coefficients"][3]["error_over_sigma"].get<double>(),
+                verdict.coefficients[3].ratio, 1e-12);
+    EXPECT_TRUE(json["coefficients"][4]["estimate"].is_null());
+    EXPECT_EQ(nlohmann::json::parse(json_of(judged(perfect())))["passed"], true);
+}
+
 TEST(Judge, NamesAFileThatIsNoJsonAndItsPlace) {
     const auto complaint = [](const std::string& text) {
         try {

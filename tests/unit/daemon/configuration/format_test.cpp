@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
@@ -94,6 +96,43 @@ TEST(Effective, ReadsBackAsAConfiguration) {
         [campaign]
         positions_deg = [[0.1, -0.2, 1e-7]]
         table_g = [9, 0, 0.30000000000000004])");
+}
+
+TEST(Effective, JsonHasEachValueByItsType) {
+    const Loaded loaded = parse(R"(
+        [can]
+        path = "@a \"quoted\" 'name' \\ # no comment"
+        [site]
+        latitude_deg = -50
+        [campaign]
+        positions_deg = [[0.1, -0.2, 1e-7]]
+        table_g = [9, 0, 0.30000000000000004]
+        [[interlock]]
+        name = "recording_degraded"
+        reaction = "abort"
+        dwell_s = 1.5)",
+                                "/etc/rig.toml", false);
+    const auto list = nlohmann::json::parse(format_effective_json(loaded));
+    ASSERT_EQ(list.size(), loaded.effective.size());
+    std::map<std::string, nlohmann::json> of_key;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        EXPECT_EQ(list[i]["key"], loaded.effective[i].key);
+        EXPECT_EQ(list[i]["unit"], loaded.effective[i].unit);
+        EXPECT_EQ(list[i]["origin"], loaded.effective[i].origin);
+        EXPECT_EQ(list[i]["meaning"], loaded.effective[i].doc);
+        EXPECT_FALSE(list[i]["value"].is_null()) << loaded.effective[i].key;
+        of_key[loaded.effective[i].key] = list[i]["value"];
+    }
+    EXPECT_EQ(of_key["can.path"], "@a \"quoted\" 'name' \\ # no comment");
+    EXPECT_EQ(of_key["site.latitude_deg"], -50.0);
+    EXPECT_EQ(of_key["campaign.positions_deg"], nlohmann::json::parse("[[0.1, -0.2, 1e-7]]"));
+    EXPECT_EQ(of_key["campaign.table_g"][2], 0.30000000000000004);
+    EXPECT_EQ(of_key["threads.lock_memory"], true);
+    const auto& rows = of_key["interlock"];
+    EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [](const auto& row) {
+        return row["name"] == "recording_degraded" && row["dwell_s"] == 1.5;
+    })) << rows;
+    EXPECT_EQ(of_key["threads.acquisition_cpu"], -1);
 }
 
 TEST(Schema, EveryKeyIsThereOnceWithTypeAndDoc) {

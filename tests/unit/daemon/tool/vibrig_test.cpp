@@ -344,6 +344,32 @@ TEST_F(VibrigOptions, OfTwoThingsToPrintNoneIsPrinted) {
     EXPECT_EQ(out, "");
 }
 
+TEST_F(VibrigOptions, ACheckSaysTheSameInJson) {
+    const std::string rig =
+        "clock.source = \"rig\"\ncan.port = \"seqpacket\"\ncan.path = \"@rig\"\n";
+    write("rig.toml", rig);
+    ASSERT_EQ(run(VIBRIGD, "--check --config rig.toml"), 0) << error;
+    const std::string text = out, warned = error;
+    ASSERT_EQ(run(VIBRIGD, "--check --json --config rig.toml"), 0) << error;
+    const auto json = nlohmann::json::parse(out);
+    EXPECT_EQ(error, warned);
+    EXPECT_NE(text.find("# SHA-256 of what stands above: " + json["sha256"].get<std::string>()),
+              std::string::npos);
+    EXPECT_EQ(json["refusal"], "");
+    EXPECT_FALSE(json["forecast"].empty());
+    for (const auto& line : json["forecast"])
+        EXPECT_NE(text.find("# " + line.get<std::string>()), std::string::npos) << line;
+    EXPECT_GT(json["configuration"].size(), 200U);
+    // AND what is refused says why in both
+    write("rig.toml", rig + "[campaign]\npositions_deg = [[0, 0, 0]]\n");
+    EXPECT_EQ(run(VIBRIGD, "--check --json --config rig.toml"), 2);
+    EXPECT_NE(error.find(nlohmann::json::parse(out)["refusal"].get<std::string>()),
+              std::string::npos);
+    // AND it is of --check alone
+    EXPECT_EQ(run(VIBRIGD, "--json --config rig.toml"), 2);
+    EXPECT_EQ(error.substr(0, error.find('\n')), "--json requires --check");
+}
+
 TEST_F(VibrigOptions, JsonHasATextThatIsNoUtf8) {
     // GIVEN a folder whose name is Latin-1
     ASSERT_EQ(vibrig("pki init --json --folder 'caf\351'"), 0) << error;
