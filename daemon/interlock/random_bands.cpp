@@ -115,8 +115,9 @@ RandomBands::Finding RandomBands::add(double acceleration) noexcept {
 }
 
 double RandomBands::ratio() const noexcept {
-    const Rule& rule = rules_[0];
-    return count_ < rule.values ? 0 : sums_[0] / (static_cast<double>(rule.values) * mean_square_);
+    const std::size_t r = count_ >= rules_[1].values ? 1 : 0;
+    const auto values = static_cast<double>(rules_[r].values);
+    return count_ < rules_[r].values ? 0 : sums_[r] / (values * mean_square_);
 }
 
 }  // namespace vibrig::rt

@@ -44,7 +44,9 @@ class RandomBands {
     void watch_below(bool watch) noexcept;
     /// The mean square over what it is to be that the newest finding rests on.
     [[nodiscard]] double judged() const noexcept { return judged_; }
-    /// Newest mean square over what it is to be, over the shortest window; 0: none yet.
+    /// Newest mean square over what it is to be, for people: over the window in which 3 dB too much
+    /// are found, so that a right level is not seen beyond the bands by chance; until that is full
+    /// over the shortest, and before that 0.
     [[nodiscard]] double ratio() const noexcept;
     [[nodiscard]] const std::array<Rule, 3>& rules() const noexcept { return rules_; }
 

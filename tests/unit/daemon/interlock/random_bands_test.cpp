@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
@@ -138,6 +139,32 @@ TEST(RandomBands, ThreeDecibelsTooMuchOrTooLittleAreFoundInTheirWindows) {
             EXPECT_LE(down, 2 * bands.rules()[2].window_s) << hz << ", seed " << seed;
         }
     }
+}
+
+TEST(RandomBands, ARightLevelIsShownInsideItsBands) {
+    // GIVEN 20 rigs at their level, a minute each, 40 values a second
+    int looks = 0, beyond_by_24_values = 0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        Values values(truck(), 40, seed);
+        Bands bands(settings_of(40));
+        std::vector<double> squares;
+        for (int i = 0; i < 60 * 40; ++i) {
+            const double value = values.next();
+            static_cast<void>(bands.add(value));
+            squares.push_back(value * value);
+            if (squares.size() < bands.rules()[1].values) continue;
+            // THEN what is shown is within 3 dB: a mean of 117 squares is not, once in 8e5
+            EXPECT_GT(bands.ratio(), std::pow(10, -0.3)) << "seed " << seed << ", " << i;
+            EXPECT_LT(bands.ratio(), std::pow(10, 0.3)) << "seed " << seed << ", " << i;
+            ++looks;
+            beyond_by_24_values +=
+                std::accumulate(squares.end() - 24, squares.end(), 0.0) / 24 < std::pow(10, -0.3)
+                    ? 1
+                    : 0;
+        }
+    }
+    // AND that of the shortest window would not be: P(chi-square of 24 below 12), 2.0 %
+    EXPECT_NEAR(beyond_by_24_values / static_cast<double>(looks), 0.020, 0.012) << looks;
 }
 
 TEST(RandomBands, NoNumberIsWrongAndBeginForgets) {
