@@ -242,13 +242,12 @@ void print_check(const vibrig::configuration::Loaded& loaded, bool as_json) {
     std::istringstream lines(forecast.words);
     for (std::string line; std::getline(lines, line);) words.push_back(line);
     if (as_json) {
-        using Json = nlohmann::ordered_json;
-        const Json all{
+        const nlohmann::ordered_json all{
             {"sha256", sha256},
             {"forecast", words},
             {"refusal", forecast.refusal},
             {"warnings", warnings},
-            {"configuration", Json::parse(vibrig::configuration::format_effective_json(loaded))}};
+            {"configuration", vibrig::configuration::effective_json(loaded)}};
         std::cout << vibrig::proto::json_text(all, 2) << '\n';
     } else {
         // As comments: what stands above reads back as a configuration.

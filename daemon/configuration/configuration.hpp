@@ -153,9 +153,6 @@ struct Loaded {
 [[nodiscard]] Loaded parse(const std::string& text, const std::string& name, bool daemon);
 /// The table of --check.
 [[nodiscard]] std::string format_effective(const Loaded& loaded);
-/// The same for machines: a JSON list of {"key", "value", "unit", "origin", "meaning"}, the values
-/// numbers, strings, lists and tables.
-[[nodiscard]] std::string format_effective_json(const Loaded& loaded);
 /// Every key with type, unit, default, bounds and doc, as --help and the manual show it.
 [[nodiscard]] std::string format_schema();
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/forms.hpp"
 #include "daemon/configuration/schema.hpp"
-#include "proto/json_text.hpp"
 
 namespace vibrig::configuration {
 
@@ -79,7 +79,7 @@ std::string format_effective(const Loaded& loaded) {
     return columns(rows);
 }
 
-std::string format_effective_json(const Loaded& loaded) {
+nlohmann::ordered_json effective_json(const Loaded& loaded) {
     // The values are TOML, which its own library turns into JSON.
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const EffectiveValue& value : loaded.effective) {
@@ -91,7 +91,7 @@ std::string format_effective_json(const Loaded& loaded) {
                         {"origin", value.origin},
                         {"meaning", value.doc}});
     }
-    return proto::json_text(list);
+    return list;
 }
 
 std::string format_schema() {

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace vibrig::configuration {
+
+struct Loaded;
 
 /// What stands in the file of format_essentials() for what only the rig's people know; no key takes
 /// it.
@@ -15,5 +18,9 @@ inline constexpr const char* kBlank = "FILL IN";
 /// "x-bounds" and "x-meaning" say of a key what vibrigd --schema does, "x-conditions" what an
 /// interlock row may watch, "x-rows" the rows in force by default.
 [[nodiscard]] std::string format_json_schema();
+
+/// The table of --check for machines: a list of {"key", "value", "unit", "origin", "meaning"}, the
+/// values numbers, strings, lists and tables.
+[[nodiscard]] nlohmann::ordered_json effective_json(const Loaded& loaded);
 
 }  // namespace vibrig::configuration

@@ -4,6 +4,7 @@
 #include <set>
 #include <sstream>
 
+#include "daemon/configuration/forms.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
 
@@ -112,7 +113,7 @@ TEST(Effective, JsonHasEachValueByItsType) {
         reaction = "abort"
         dwell_s = 1.5)",
                                 "/etc/rig.toml", false);
-    const auto list = nlohmann::json::parse(format_effective_json(loaded));
+    const nlohmann::ordered_json list = effective_json(loaded);
     ASSERT_EQ(list.size(), loaded.effective.size());
     std::map<std::string, nlohmann::json> of_key;
     for (std::size_t i = 0; i < list.size(); ++i) {
