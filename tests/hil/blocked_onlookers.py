@@ -25,8 +25,6 @@ RATE_HZ = 40
 RING_SAMPLES = 16384      # of the recorder: what waits for it
 BLOCKED_S = 450.0         # longer than the ring lasts
 SERVER_S = 60.0
-# A Modbus request is an event, and events are what virtual time costs.
-SELDOM = {"poll_period_ms": 500, "watchdog_period_ms": 1000}
 RUNNING, REST = 2, (0, 4)   # the shaker's states
 ABORT = "".join(f'[[interlock]]\nname = "{name}"\nreaction = "abort"\ndwell_s = 1.0\n'
                 for name in ("recording_degraded", "server_stuck"))
@@ -113,7 +111,7 @@ def only_degrades(checks, programs):
     with tempfile.TemporaryDirectory() as folder:
         rig = m.FaultRig(programs, folder)
         try:
-            rig.start(1, record={"enabled": True, "raw": False}, shaker=SELDOM, threads=m.THREADS)
+            rig.start(1, record={"enabled": True, "raw": False}, threads=r.NO_PRIORITY)
             shaking, found = rig.shake()
             checks.check(shaking, "the table shakes", found + rig.logs())
             missed = slow_recorder(checks, rig)
@@ -131,7 +129,7 @@ def stops_if_asked_to(checks, programs):
     with tempfile.TemporaryDirectory() as folder:
         rig = m.FaultRig(programs, folder)
         try:
-            rig.start(2, ABORT, record={"enabled": True, "raw": False}, threads=m.THREADS)
+            rig.start(2, ABORT, record={"enabled": True, "raw": False}, threads=r.NO_PRIORITY)
             for thread, row in (("recorder", "recording_degraded"), ("server", "server_stuck")):
                 shaking, found = rig.shake()
                 checks.check(shaking, f"{row} says abort: the table shakes before", found + rig.logs())

@@ -175,10 +175,6 @@ PATIENT = {"can": {"join_deadline_ms": 2000, "stale_deadline_ms": 5000}, "gimbal
            "shaker": {"response_timeout_ms": 5000, "watchdog_period_ms": 1000}}
 
 
-# In virtual time nobody is late; a thread that comes first is only woken for every frame instead of every sample.
-THREADS = {"acquisition_priority": 0, "estimator_priority": 0}
-
-
 class FaultRig(r.Rig):
     def __init__(self, programs, folder):
         super().__init__(programs, BUS, "real", folder)
@@ -481,7 +477,7 @@ def inside(programs, what):
     with tempfile.TemporaryDirectory() as folder:
         rig = FaultRig(programs, folder)
         try:
-            rig.start(1, threads=THREADS)
+            rig.start(1, threads=r.NO_PRIORITY)
             rig.wait_for(r.measuring, 60)
             if what.startswith("matrix"):
                 matrix(checks, rig, what.removeprefix("matrix"))

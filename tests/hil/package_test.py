@@ -23,7 +23,6 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 import service_manager as stages  # noqa: E402
-import vcan_campaign  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 UNIT = "vibrigd.service"
@@ -215,7 +214,7 @@ def runs_a_campaign(checks, rig, timeout_s):
 
 def is_guarded(checks, rig):
     """The guard's unit beside the daemon's, for this part only. From here on the priorities, which were seen, cost only time."""
-    rig.threads = vcan_campaign.THREADS
+    rig.threads = r.NO_PRIORITY
     configure(rig, guard={"socket": "/run/vibrig-guard/guard.sock"})
     succeeds(checks, "systemctl enable --now vibrig-guard", "systemctl", "enable", "--now", GUARD)
     output("systemctl", "restart", UNIT)

@@ -20,7 +20,7 @@ def start(rig, seed):
         json.dump({"runs": [c.random_run([0, 0, 0], "identify"),
                             {"position": [0, 0, 0], "table_g": 5.0, "frequency_hz": 15}]}, file)
     rig.start(seed, c.CONFIGURATION, campaign={**CAMPAIGN, "plan": plan}, truth=TRUTH, spectrum={"mount": "hard", "mode": "mixed"},
-              threads={"acquisition_priority": 0, "estimator_priority": 0},   # as those of fault_matrix
+              threads=r.NO_PRIORITY,
               **{f"shaker.registers.{role}": keys for role, keys in c.REGISTERS.items()})
     rig.wait_for(r.measuring, 60)
 

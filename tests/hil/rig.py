@@ -20,6 +20,10 @@ PR_SET_PDEATHSIG = 1
 PATIENT = {"can": {"stale_deadline_ms": 10000}, "gimbal": {"status_deadline_ms": 10000},
            "shaker": {"response_timeout_ms": 5000, "watchdog_period_ms": 1000}}
 
+# In virtual time nobody is late, and a machine of one processor wakes a thread that comes first for every frame instead of every
+# sample. With its priorities the daemon runs in package_test.py.
+NO_PRIORITY = {"acquisition_priority": 0, "estimator_priority": 0}
+
 # Of a truth: gimbals that slew in a second or two. At 5 deg/s a campaign of short dwells takes most of its time to turn them.
 QUICK = {"platform": {"slew_deg_per_s": 60}}
 

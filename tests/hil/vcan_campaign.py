@@ -25,9 +25,6 @@ STATUS_IDS = {0x210, 0x220, 0x221}
 COMMAND_IDS = {0x200}
 SEED = 7
 ROUNDS = 20  # of garbage
-# On a machine of one processor a thread that comes first is woken for every frame instead of every sample; it has its priority in
-# package_test.py.
-THREADS = {"acquisition_priority": 0, "estimator_priority": 0}
 ATTEMPTS = 5   # of a campaign that the machine itself holds up
 
 
@@ -264,7 +261,7 @@ def with_pymodbus(checks, programs, folder):
     """The daemon's Modbus side against an independent implementation, which drives the table of the simulated rig."""
     rig = r.Rig(programs, BUS, "real", folder)
     rig.modbus_port = 1502
-    rig.configure(SHORT, threads=THREADS, **{**r.PATIENT, "shaker": {"response_timeout_ms": 5000}})   # its feeds are counted
+    rig.configure(SHORT, threads=r.NO_PRIORITY, **{**r.PATIENT, "shaker": {"response_timeout_ms": 5000}})   # its feeds are counted
     platform = r.Rig(programs, BUS, "real", folder)
     played = None
     try:
@@ -303,7 +300,7 @@ def life(timed, checks, programs, folder, may_repeat):
     rig = r.Rig(programs, BUS, "real", folder)
     try:
         rig.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
-        rig.configure(SHORT, threads=THREADS, **r.PATIENT)
+        rig.configure(SHORT, threads=r.NO_PRIORITY, **r.PATIENT)
         rig.start_daemon()
         if not timed(campaign, checks, rig, folder, may_repeat):
             return False

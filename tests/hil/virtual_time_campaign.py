@@ -22,8 +22,6 @@ import rig as r  # noqa: E402
 HERE = os.path.dirname(os.path.abspath(__file__))
 # A Modbus request is an event, and events are what virtual time costs.
 SHAKER = {"poll_period_ms": 500, "watchdog_period_ms": 1000}
-# In virtual time nobody is late; a thread that comes first is only woken for every frame instead of every sample.
-THREADS = {"acquisition_priority": 0, "estimator_priority": 0}
 SETTLED_S = 5.0123
 START_S = 0.0037
 POLL_S = 10
@@ -56,7 +54,7 @@ def inside(programs, name, results):
             # Its ticks are where nothing else happens, however long its program takes to begin.
             time.sleep(START_S)
             rig.start_plant("--seed", "1", *(() if name == "whole" else ("--truth", rig.truth_file(r.QUICK))))
-            rig.configure(CAMPAIGNS[name], shaker=SHAKER, threads=THREADS)
+            rig.configure(CAMPAIGNS[name], shaker=SHAKER, threads=r.NO_PRIORITY)
             rig.start_daemon()
             # Between the rig's ticks, and no looks at the daemon until its result is there: whoever asks at the moment
             # of a tick moves its stamp.
